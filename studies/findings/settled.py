@@ -13,13 +13,14 @@ from results_schema.status import Fidelity
 from studies.findings import theory
 from studies.protocol.study import question_of
 from studies.results.formatting import counted, percent
+from studies.results.places import chosen
 from studies.results.results import Results
 
 BASIS = 12  # modes of the body, of whose vibrations with mass and dampers the slowest decay counts
 SLOW = 6  # eigenvalues of these, the smallest: three vibrations, of which the third swings by a hundredth of the first
+SHOWN = 3  # sensors, of many, that sentences and figures are about
 MOST = 1000  # different bodies, masses and dampers in a sweep, an eighth of a second; of more no decay is known
 PLACES = 65  # along the way, at the heaviest of which the mass stands: there the vibration dies out the slowest
-REMAINDER = "by damping and with the carriage on its way"
 #: Of keys of swept numbers, with the end of their range at which a variant settles last.
 ENDS = (
     (".motion.speed", np.min, "from {} on"),
@@ -103,15 +104,26 @@ def odd_parts(results: Results) -> Array:
     return np.where(fine[..., None], odd, np.nan) if fine.any() else odd
 
 
+def shown_sensors(results: Results) -> list[str]:
+    """The sensors that sentences and figures are about, in the order of the file: all, or of many the one whose two
+    ways differ most and others, evenly spread."""
+    sensors, odd = list(results.sensors), odd_parts(results).reshape(-1, len(results.sensors))
+    found = list(chosen(sensors, SHOWN))
+    if len(sensors) > SHOWN and np.isfinite(odd).any():
+        most = sensors[int(np.argmax(np.nan_to_num(odd, nan=-1.0).max(axis=0)))]
+        found = found if most in found else [found[0], found[-1], most]
+    return [name for name in sensors if name in found]
+
+
 def where_late(results: Results, late: Mask) -> str:
-    """From which speed on and up to which damping ratio variants have not settled."""
-    said = ""
+    """From which speed on and up to which damping ratio variants have not settled, in brackets."""
+    said = list[str]()
     for ending, pick, words in ENDS:
         axis = results.axis(ending)
         if axis is not None:
             value = float(pick(results.everywhere(results.dataset[axis.name])[late]))
-            said += f", {words.format(f'{axis.noun} {axis.in_words(value)}')}"
-    return said
+            said.append(words.format(f"{axis.noun} {axis.in_words(value)}"))
+    return f" ({', '.join(said)})" if said else ""
 
 
 def told_unsettled(results: Results) -> list[str]:
@@ -125,7 +137,7 @@ def told_unsettled(results: Results) -> list[str]:
     enough = 1.0 + (cycles - 1.0) * np.log(held) / np.log(most) if cycles > 1.0 and most < 1.0 else np.inf
     known = np.isfinite(enough)
     advice = f"{np.ceil(enough):,.0f} cycles would be enough" if known else "more cycles, or damping, help"
-    told = f"of the start is left in the last cycle, {REMAINDER}{where_late(results, late)}"
+    told = f"of the start's vibration is left in the last cycle{where_late(results, late)}"
     return [
         f"In {int(late.sum()):,} of {counted(results.size, 'variant')} more than {percent(held)} {told}: what is told "
         f"holds the start too, at most {percent(most)} of it; {advice}."

@@ -15,7 +15,7 @@ from results_schema.variable import outputs
 from results_schema.variables import MARCH, declare
 from studies.findings import indices, theory
 from studies.findings.absolute_errors import absolute_errors, told_error
-from studies.findings.settled import REMAINDER, Asked, odd_parts, remainder_of_start, thresholds, where_late
+from studies.findings.settled import Asked, odd_parts, remainder_of_start, shown_sensors, thresholds, where_late
 from studies.protocol.study import Kind
 from studies.results.axes import VARIANT
 from studies.results.findings_common import exceeds, first_carriage, in_words, told_statuses, uncertainty
@@ -27,7 +27,6 @@ LEAST_CRUISE = 0.5  # of the stroke: comparing less says nothing of the stroke
 
 NOTICEABLE = 0.01  # of the static range: what counts as a difference in the answer
 CLOSE = 0.05
-MOST_SENSORS = 3
 
 RESULTS = outputs("""
     lag | sensor | m | nan | lag of the response
@@ -115,7 +114,7 @@ class Asymmetry(Kind):
         settled = ~(left > thresholds(results)[0])
         answer, start = _answer(results), _start(results, left)
         said = [answer, start] if settled.any() else [start, answer]
-        for sensor in list(results.sensors)[:MOST_SENSORS]:
+        for sensor in shown_sensors(results):
             said += [_lag(results, sensor), _first_beyond(results, sensor, settled)]
         return [*said, *_mass(results), *told_statuses(results)]
 
@@ -146,14 +145,14 @@ def _start(results: Results, left: Array) -> str:
     known, most = np.isfinite(left), thresholds(results)[0]
     late = left > most
     if not known.any():
-        return "How much of the start is left in the last cycle is not known, with these dampers."
+        return "How much of the start's vibration is left in the last cycle is not known, with these dampers."
     unknown = f" In {counted(int((~known).sum()), 'variant')} with dampers it is not known." * (not known.all())
     if not late.any():
-        told = f"at most {percent(float(left[known].max()))} of the start is left, {REMAINDER}"
+        told = f"at most {percent(float(left[known].max()))} of the start's vibration is left"
         who = "every variant" if known.all() else "every other variant"
         return f"In the last cycle {told}: {who} has settled.{unknown}"
     where = where_late(results, late)
-    told = f"more than {percent(most)} of the start is left in the last cycle, {REMAINDER}{where}"
+    told = f"more than {percent(most)} of the start's vibration is left in the last cycle{where}"
     if late.all():
         return f"No variant has settled: {told}. What follows holds the start too; run more cycles or with damping."
     count = f"In {int(late.sum()):,} of {counted(results.size, 'variant')}"

@@ -140,14 +140,14 @@ class DoublePeak(Kind):
 
     def findings(self, results: Results) -> list[str]:
         said = []
-        for sensor in list(results.sensors)[:MOST_SENSORS]:
+        for sensor in chosen(list(results.sensors), MOST_SENSORS):
             said += [_answer(results, sensor), *_breaks(results, sensor), *_amplified(results, sensor)]
             said += [*_halves(results, sensor), *_end_springs(results, sensor)]
         return [*said[:1], *told_unsettled(results), *said[1:], *told_statuses(results)]
 
     def named(self, results: Results) -> list[Index]:
         """For every sensor of the answer the variant where two peaks end and that with the largest amplification."""
-        sensors = list(results.sensors)[:MOST_SENSORS]
+        sensors = list(chosen(list(results.sensors), MOST_SENSORS))
         places = [first_break(results, sensor) for sensor in sensors]
         places += [extreme(results.of_sensor("dynamic_amplification", sensor)) for sensor in sensors]
         return [place for place in places if place is not None]
@@ -206,22 +206,36 @@ def _answer(results: Results, sensor: str) -> str:
     place = first_break(results, sensor)
     if place is None:
         return f"{sensor}: {share} of the variants; not all peak twice even at the lowest frequency."
-    below = f"{peaks_in_words(pattern(results, sensor))} per cycle below {_pace(results, float(ratio[place]))}"
+    usual = peaks_in_words(pattern(results, sensor))
+    below = f"{usual} per cycle below {_pace_and_ratio(results, float(ratio[place]))}"
+    else_varied = ", whatever else is varied" if len(_varied(results)) > 1 else ""
     return (
-        f"{sensor}: {below}, whatever else is varied; there "
+        f"{sensor}: {below}{else_varied}; there "
         f"the pattern breaks first, with {counted(int(counts[place]), 'peak')}{in_words(results, place)}. In all: "
         f"{share} of the variants."
     )
 
 
-def _pace(results: Results, ratio: float) -> str:
-    """A frequency of the cycle in words, from its ratio to the first natural one: as swept, where one value has it."""
-    axis, part = results.axis(*PACES), f"{number(ratio)} of the first natural frequency"
-    if axis is None:
-        return part
+def _varied(results: Results) -> list[str]:
+    """Names of the swept numbers that have several values."""
+    return [axis.name for axis in results.axes if len(axis.values) > 1]
+
+
+def _pace(results: Results, ratio: float, times: float = 1.0) -> str:
+    """A frequency of the cycle, so many times that of a ratio to the first natural one, in words: as swept, where one
+    value has it, else that ratio."""
+    axis = results.axis(*PACES)
     same = results.everywhere(theory.frequency_ratio(results)) == ratio
-    values = np.unique(results.everywhere(results.dataset[axis.name])[same])
-    return f"{axis.in_words(float(values[0]))} ({part})" if values.size == 1 else part
+    values = np.unique(results.everywhere(results.dataset[axis.name])[same]) if axis is not None else np.zeros(0)
+    if axis is None or values.size != 1:
+        return f"{number(times * ratio)} of the first natural frequency"
+    return axis.in_words(float(values[0]) * times)
+
+
+def _pace_and_ratio(results: Results, ratio: float) -> str:
+    """The same, with the ratio beside it."""
+    said, part = _pace(results, ratio), f"{number(ratio)} of the first natural frequency"
+    return said if said == part else f"{said} ({part})"
 
 
 def _breaks(results: Results, sensor: str) -> list[str]:
@@ -234,7 +248,11 @@ def _breaks(results: Results, sensor: str) -> list[str]:
         return []
     group = results.deciding_axis("peaks_per_cycle", sensor)
     if group is None:
-        return [f"{sensor}: {_break(results, usual, counts, known)}."]
+        place = first_break(results, sensor)
+        if place is None:
+            return [f"{sensor}: {_break(results, usual, counts, known)}."]
+        met = _harmonic(results, place, float(ratio[place]))
+        return [f"{sensor}: {met}."] if met else []
     along = results.everywhere(results.dataset[group.name])
     said = []
     for value in chosen(sorted(set(group.values.tolist())), MOST_GROUPS):
@@ -255,15 +273,23 @@ def _break(results: Results, usual: int, counts: Array, among: Mask) -> str:
     if not fine.any():
         return f"{counted(int(counts[place]), 'peak')} already at the lowest, {_pace(results, first)}"
     text = f"{peaks_in_words(usual)} up to {_pace(results, float(ratio[fine].max()))}, {text}"
+    met = _harmonic(results, place, first)
+    return f"{text} ({met})" if met else text
+
+
+def _harmonic(results: Results, place: Index, first: float) -> str:
+    """Which harmonic of the cycle meets the natural frequency of the loaded body near a frequency ratio, and where; ""
+    where none does."""
     mass = results.dataset.coords.get("mass_ratio")
     if mass is None:
-        return text
+        return ""
     own = np.array([float(results.everywhere(mass)[place])])
     lines = {order: float(theory.breakdown(results, own, order)[0]) for order in theory.ORDERS}
     near = min(lines, key=lambda order: abs(np.log(lines[order] / first)))
     if abs(lines[near] / first - 1.0) > NEAR:
-        return text
-    return f"{text} (harmonic {near} of the cycle meets the natural frequency with the mass at {number(lines[near])})"
+        return ""
+    where = _pace(results, first, lines[near] / first)
+    return f"harmonic {near} of the cycle meets the natural frequency with the mass at {where}"
 
 
 def _end_springs(results: Results, sensor: str) -> list[str]:
@@ -332,4 +358,5 @@ def _from_where(results: Results, odd: Array) -> str:
     unlike, known = odd > UNLIKE, np.isfinite(odd)
     if not unlike.any() or not (known & (ratio < ratio[unlike].min())).any():
         return ""
-    return f" by more than {percent(UNLIKE)} of the even harmonics from {_pace(results, float(ratio[unlike].min()))} on"
+    first = _pace_and_ratio(results, float(ratio[unlike].min()))
+    return f" by more than {percent(UNLIKE)} of the even harmonics from {first} on"

@@ -146,11 +146,9 @@ def _span(results: Results, sensor: str) -> str:
         f"{results.carriage_name} at {quantity(float(places[end[-1]]), 'm')}"
         for end in ends
     ]
-    span = float(np.nanmax(found) - np.nanmin(found)) / largest
-    return (
-        f"{sensor}: from {texts[0]} to {texts[1]}{_own_weight(results, sensor, ends[1])}; the difference is "
-        f"{percent(span)} of the largest size."
-    )
+    low, high = float(np.nanmin(found)), float(np.nanmax(found))
+    apart = f"; the difference is {percent((high - low) / largest)} of the largest size" if low * high >= 0.0 else ""
+    return f"{sensor}: from {texts[0]} to {texts[1]}{_own_weight(results, sensor, ends[1])}{apart}."
 
 
 def _own_weight(results: Results, sensor: str, place: Index) -> str:

@@ -57,10 +57,9 @@ class Trajectory(Kind):
 
     def findings(self, results: Results) -> list[str]:
         traced = results.traced()
-        said = [_kept(results)] if traced else ["No history was kept."]
-        said += residuals(results, question_of(results.study, AskedOfRest).residual)
+        said = residuals(results, question_of(results.study, AskedOfRest).residual)
         said += [_span(results, sensor) for sensor in of_every_quantity(results, MOST_SENSORS)]
-        return [*said, *told_statuses(results)]
+        return [*said, _kept(results) if traced else "No history was kept.", *told_statuses(results)]
 
 
 KIND = Trajectory()
@@ -91,4 +90,5 @@ def _span(results: Results, sensor: str) -> str:
     places = (results.index_of(int(flat)) for flat in (np.nanargmin(low), np.nanargmax(high)))
     named = zip((f"{sensor}_min", f"{sensor}_max"), places, strict=True)
     looser = max(named, key=lambda end: np.nan_to_num(results.error_at(*end)))
-    return f"{sensor}: from {span}{over}{uncertainty(results, *looser)}."
+    what = f"{results.noun(sensor)} {results.place(sensor)}"
+    return f"{sensor}: the {what} goes from {span}{over}{uncertainty(results, *looser)}."

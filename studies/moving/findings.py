@@ -8,7 +8,7 @@ from results_schema.quantities import AFTER_STOP
 from studies.findings.amplification import sizes
 from studies.findings.beyond import limits_of, ranked, told_limit
 from studies.findings.effects import by_effect
-from studies.results.findings_common import in_words, told_statuses
+from studies.results.findings_common import in_words, told_statuses, uncertainty
 from studies.results.formatting import counted, quantity
 from studies.results.places import extreme
 from studies.results.results import Results
@@ -24,6 +24,7 @@ def answer(results: Results) -> list[str]:
 def others(results: Results) -> Iterator[str]:
     """All but carriages that slide."""
     yield from _sensors(results)
+    yield from _driven(results)
     yield from _ends(results)
     yield from _energy(results)
     yield from _beyond_theory(results)
@@ -44,7 +45,7 @@ def sliding(results: Results) -> Iterator[str]:
         over = " over all variants" if results.size > 1 else ""
         way = _span(dataset[f"{name}_position_min"].values, dataset[f"{name}_position_max"].values, "m")
         swings = dataset[f"{name}_period"].values
-        said = f"{name} slides over {way}{over}"
+        said = f"{name} slides from {way}{over}"
         if np.isfinite(swings).any():
             many = results.size > 1
             said += f", with a period of {_span(swings, swings, 's') if many else quantity(float(swings), 's', 4)}"
@@ -59,7 +60,7 @@ def sliding(results: Results) -> Iterator[str]:
 def _sensors(results: Results) -> Iterator[str]:
     limits = limits_of(results.study)
     for sensor in ranked(results, limits)[:MOST_SENSORS]:
-        low, high = (results.dataset[f"{sensor}_{end}"] for end in ("min", "max"))
+        low, high = (results.dataset[f"{sensor}_{end}"].where(results.with_values) for end in ("min", "max"))
         if np.isnan(low.values).all():
             yield f"{sensor}: no variant has values."
             continue
@@ -74,7 +75,7 @@ def _sensors(results: Results) -> Iterator[str]:
         index = extreme(largest)
         assert index is not None
         span = _span(low.values[index], high.values[index], results.sensors[sensor])
-        yield f"{sensor}: from {span}{in_words(results, index)}.{beyond}"
+        yield f"{sensor}: the {results.noun(sensor)} goes from {span}{in_words(results, index)}.{beyond}"
 
 
 def _position_error(results: Results, sensor: str, beyond: str) -> Iterator[str]:
@@ -105,6 +106,20 @@ def _most_and_least(results: Results, name: str) -> str:
     if found[least] < found[most]:
         said += f"; of all variants least, {quantity(float(found[least]), 'm')},{in_words(results, least)}"
     return said
+
+
+def _driven(results: Results) -> Iterator[str]:
+    """How hard carriages press that are driven along their tracks."""
+    for name, carriage in results.study.carriage.items():
+        if carriage.motion.slides:
+            continue
+        ends = (results.dataset[f"{name}_contact_force_{end}"] for end in ("min", "max"))
+        low, high = (one.where(results.with_values) for one in ends)
+        index = extreme(np.maximum(np.abs(low), np.abs(high)))
+        if index is not None:
+            span = _span(low.values[index], high.values[index], "N")
+            loosely = uncertainty(results, f"{name}_contact_force_max", index)
+            yield f"{name}: the contact force goes from {span}{loosely}{in_words(results, index)}."
 
 
 def _ends(results: Results) -> Iterator[str]:

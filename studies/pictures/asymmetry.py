@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from textwrap import fill
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,7 +15,7 @@ from matplotlib.lines import Line2D
 
 from results_schema.arrays import Array
 from studies.findings import theory
-from studies.findings.settled import odd_parts, thresholds
+from studies.findings.settled import odd_parts, settled, shown_sensors, thresholds
 from studies.pictures.common import figures as look
 from studies.pictures.common.figures import Figure, banded, colour_bar, draw, logarithmic, zero_line
 from studies.pictures.common.sweep_view import (
@@ -30,11 +32,10 @@ from studies.pictures.common.sweep_view import (
 )
 from studies.pictures.common.traces import odd_part, over_position, picked, there_and_back
 from studies.results.findings_common import exceeds
-from studies.results.formatting import percent, quantity, scale_for
-from studies.results.places import Index, chosen, extreme
+from studies.results.formatting import listed, percent, quantity, scale_for
+from studies.results.places import Index, extreme
 from studies.results.results import Results
 
-MOST_SENSORS = 3
 BANDS = (0.1, 0.3, 1.0, 3.0, 5.0, 10.0)  # percent
 LAGS_SHOWN = 1.6
 NARROW = 22  # letters of a line in a legend beside
@@ -43,11 +44,15 @@ VISIBLE = 0.03  # odd part that an eye sees in the response
 
 def pictures(results: Results) -> list[Figure]:
     """All figures that the sweep and the kept histories allow."""
-    sensors = list(chosen(list(results.sensors), MOST_SENSORS))
+    sensors = shown_sensors(results)
     left_out = len(results.sensors) - len(sensors)
     more = f"{left_out} more sensors are in the archive." if left_out else ""
-    found = [figure for sensor in sensors for figure in _response(results, sensor)]
-    top = extreme(results.of_sensor("odd_rms", sensors[0]))
+    telling = [sensor for sensor in sensors if _most_odd(results, sensor) > thresholds(results)[0]] or sensors[:1]
+    alike = [sensor for sensor in sensors if sensor not in telling and np.isfinite(_most_odd(results, sensor))]
+    found = [figure for sensor in telling for figure in _response(results, sensor)]
+    if found and alike:
+        found[-1] = replace(found[-1], caption=f"{found[-1].caption} {_told_alike(results, alike)}")
+    top = extreme(_odd_where_settled(results, sensors[0]))
     seen = view(results, SPEEDS, (*DAMPING, *MASSES), top)
     if seen.x is not None:
         found += [_lag(seen, sensors, more), _parts(seen, sensors, more)]
@@ -55,6 +60,22 @@ def pictures(results: Results) -> list[Figure]:
         if by_mass.y is not None and _has_map(by_mass, seen, sensors[0]):
             found.append(_map(by_mass, sensors[0]))
     return found
+
+
+def _odd_where_settled(results: Results, sensor: str) -> Array:
+    """The odd part of a sensor, in the sweep's shape; NaN where a variant has not settled."""
+    return np.asarray(odd_parts(results)[..., list(results.sensors).index(sensor)])
+
+
+def _most_odd(results: Results, sensor: str) -> float:
+    """The largest odd part of a sensor; NaN where it has none."""
+    return float(np.fmax.reduce(_odd_where_settled(results, sensor).ravel(), initial=np.nan))
+
+
+def _told_alike(results: Results, sensors: Sequence[str]) -> str:
+    """Sensors whose two ways are one line to the eye, as a sentence."""
+    each = [f"{sensor.replace('_', ' ')} by {percent(_most_odd(results, sensor))}" for sensor in sensors]
+    return f"Not drawn, as their two ways would be one line: {listed(each)} of the static range at most."
 
 
 def _has_map(by_mass: View, seen: View, sensor: str) -> bool:
@@ -66,12 +87,13 @@ def _has_map(by_mass: View, seen: View, sensor: str) -> bool:
 
 
 def _odd(seen: View, sensor: str) -> Array:
-    """The odd part over the shown plane, of the static range."""
-    return seen.plane(seen.results.of_sensor("odd_rms", sensor))
+    """The odd part over the shown plane, of the static range; NaN where a variant has not settled."""
+    values = _odd_where_settled(seen.results, sensor)
+    return seen.plane(seen.results.dataset["status"].transpose(*seen.results.dims).copy(data=values))
 
 
 def _response(results: Results, sensor: str) -> list[Figure]:
-    odd = odd_parts(results)[..., list(results.sensors).index(sensor)]
+    odd = _odd_where_settled(results, sensor)
     ranked = picked(results, odd, results.size)
     if not ranked:
         return []
@@ -151,7 +173,7 @@ def _lag(seen: View, sensors: list[str], more: str) -> Figure:
 
 
 def _lag_title(seen: View, sensor: str, lags: Array) -> str:
-    """How far the response trails or runs ahead at most."""
+    """How far the response trails or runs ahead at most, of what is shown."""
     trails, ahead = -float(np.nanmin(lags, initial=0.0)), float(np.nanmax(lags, initial=0.0))
     parts = [
         f"{words} by up to {quantity(size, 'm')}"
@@ -205,15 +227,24 @@ def _name_theory(axes: Axes, formula: str, seen: View) -> None:
     axes.legend([*handles, dashes], [*labels, fill(formula, NARROW)], **place)
 
 
+def _late(seen: View) -> Any:
+    """1 where a variant has not settled, though others have, and 0 elsewhere, over the sweep."""
+    fine, status = settled(seen.results), seen.results.dataset["status"].transpose(*seen.results.dims)
+    return status.copy(data=(~fine if fine.any() else np.zeros_like(fine)).astype(np.float64))
+
+
 def _parts(seen: View, sensors: list[str], more: str) -> Figure:
+    limits, late = [percent(part) for part in thresholds(seen.results)], seen.plane(_late(seen)).any()
     caption = seen.caption(
         "Left: rms of half the difference of forward and backward; right: rms of their mean minus the static "
-        "response; both over the static range on the cruise part. Dotted: 1 % and 5 %.",
+        f"response; both over the static range on the cruise part. Dotted: {listed(limits)}.",
+        "Dashed: variants that have not settled, which the title leaves out." if late else "",
         more,
     )
     height = 0.6 + 2.3 * len(sensors)
     results, first = seen.results, sensors[0]
-    even = np.nanmax(np.abs(seen.plane(results.of_sensor("even_excess", first))), initial=0.0)
+    excess = np.where(np.isfinite(_odd(seen, first)), seen.plane(results.of_sensor("even_excess", first)), np.nan)
+    even = np.nanmax(np.abs(excess), initial=0.0)
     title = (
         f"{first.replace('_', ' ')}: the ways differ by up to "
         f"{percent(float(np.nanmax(_odd(seen, first), initial=0.0)))} of the static range, their mean from statics by "
@@ -224,24 +255,27 @@ def _parts(seen: View, sensors: list[str], more: str) -> Figure:
 
 def _draw_parts(seen: View, sensors: list[str], drawing: Drawing) -> None:
     grid = drawing.subplots(len(sensors), 2, squeeze=False, sharex=True, sharey="row")
+    late = [curve.y > 0.0 for curve in seen.curves(_late(seen))]
     for row, sensor in zip(grid, sensors, strict=True):
         for axes, name, title in zip(row, ("odd_rms", "even_excess"), ("odd part", "even excess"), strict=True):
             curves = seen.curves(seen.results.of_sensor(name, sensor))
-            draw_curves(axes, seen, [curve._replace(y=100.0 * curve.y) for curve in curves])
+            marked = zip(curves, late, strict=True)
+            draw_curves(axes, seen, [curve._replace(y=100.0 * curve.y, loose=loose) for curve, loose in marked])
             if any((curve.y > 0.0).any() for curve in curves):
                 logarithmic(axes.yaxis)
             for threshold in thresholds(seen.results):
                 axes.axhline(100.0 * threshold, color=look.MUTED, linestyle=":", linewidth=0.9)
-            axes.set_title(f"{title}, {sensor}")
-        row[0].set_ylabel("% of the static range")
+            axes.set_title(f"{title}, {sensor.replace('_', ' ')}")
+        row[0].set_ylabel(f"part of {seen.results.noun(sensor)}\n{seen.results.place(sensor)}\n(% of the static range)")
     one_legend([axes for row in grid for axes in row[::-1]])
     for axes in grid[-1]:
         along_axis(axes, seen)
 
 
 def _map(seen: View, sensor: str) -> Figure:
-    caption = seen.caption("Rms of half the difference of forward and backward.")
-    odd = seen.results.numbers("odd_rms", sensor)
+    odd = _odd_where_settled(seen.results, sensor)
+    late = "White: variants that have not settled." if seen.plane(_late(seen)).any() else ""
+    caption = seen.caption("Rms of half the difference of forward and backward.", late)
     told = exceeds(seen.results, odd, thresholds(seen.results)[0])
     title = f"{sensor.replace('_', ' ')}: the difference of the ways {told}"
     return draw("odd-map", title, caption, 3.0, partial(_draw_map, seen, sensor))
@@ -249,5 +283,6 @@ def _map(seen: View, sensor: str) -> Figure:
 
 def _draw_map(seen: View, sensor: str, drawing: Drawing) -> None:
     axes = drawing.subplots()
-    mesh = draw_map(axes, seen, 100.0 * seen.results.of_sensor("odd_rms", sensor), **banded(BANDS))
+    odd = seen.results.of_sensor("odd_rms", sensor).where(_late(seen) == 0.0)
+    mesh = draw_map(axes, seen, 100.0 * odd, **banded(BANDS))
     colour_bar(axes, mesh, "odd part (% of the static range)", spacing="uniform")

@@ -20,6 +20,7 @@ from studies.pictures.common.sweep_view import (
     MASSES,
     SPEEDS,
     View,
+    alone,
     along_axis,
     draw_curves,
     draw_map,
@@ -36,16 +37,19 @@ from studies.results.results import Results
 MOST_SENSORS = 3
 MOST_CYCLES = 3
 ALIKE = 1e-3  # odd over even harmonics below which there is nothing to show
+LITTLE = 0.1  # of what an axis changes: another that changes less has no curves
 LEAST_RATIO = 1e-6  # below, ratios are rounding
-RATIOS = {  # file name, title and caption of the figure of each
+RATIOS = {  # file name, title, words on the axis and caption of the figure of each
     "dynamic_amplification": (
         "amplification",
-        "Dynamic over static is {} at most, in {}",
+        "The dynamic {what} is up to {value} times the static one",
+        "dynamic amplification",
         "Largest absolute value in the last cycle over the largest absolute static value.",
     ),
     "odd_even_ratio": (
         "odd-even",
-        "Odd harmonics reach {} times the even ones at most, in {}",
+        "Odd harmonics of the {what} are up to {value} times the even ones",
+        "odd over even harmonics",
         "Rms of the odd over rms of the even harmonics of the last cycle: 0 where its two halves are alike.",
     ),
 }
@@ -66,11 +70,35 @@ def pictures(results: Results) -> list[Figure]:
             axis = results.deciding_axis("peaks_per_cycle", sensor)
             own = view(results, SPEEDS, axis.paths, top) if axis is not None else seen
             if np.unique(_counts(own, sensor)).size > 1:
-                found.append(_map(own, sensor) if own.y is not None else _count(own, sensor))
+                found.append(_map(own, sensor) if _is_map(own, sensor) else _count(own, sensor))
         found += _ratio(seen, "dynamic_amplification", sensors)
         if float(np.nanmax(results.dataset["odd_even_ratio"].values, initial=0.0)) > ALIKE:
-            found += _ratio(seen, "odd_even_ratio", sensors)
+            found += _ratio(_odd_view(results, sensors), "odd_even_ratio", sensors)
     return [*found, *([_harmonics(results, sensors[0], shown)] if shown else [])]
+
+
+def _odd_view(results: Results, sensors: list[str]) -> View:
+    """The sweep where odd harmonics are largest over even ones, along what changes this ratio most."""
+    ratios = {sensor: results.of_sensor("odd_even_ratio", sensor) for sensor in sensors}
+    best = max(sensors, key=lambda sensor: float(np.nan_to_num(ratios[sensor].values).max()))
+    top, axis = extreme(ratios[best]), results.deciding_axis("odd_even_ratio", best)
+    seen = view(results, SPEEDS, MASSES, top)
+    if axis is None or seen.x is None or seen.is_sampled:
+        return seen
+    other = view(results, axis.paths, SPEEDS, top)
+    assert other.x is not None
+    most = other.most_along(other.x, ratios[best])
+    if most < seen.most_along(seen.x, ratios[best]):
+        return seen
+    return alone(other) if other.y is not None and other.most_along(other.y, ratios[best]) < LITTLE * most else other
+
+
+def _is_map(seen: View, sensor: str) -> bool:
+    """Whether numbers of peaks change along both axes of a view: a map of stripes is steps along one."""
+    counts = seen.results.of_sensor("peaks_per_cycle", sensor)
+    if seen.is_sampled:
+        return seen.y is not None
+    return seen.y is not None and all(seen.most_along(axis, counts) > 0.0 for axis in (seen.x, seen.y) if axis)
 
 
 def _counts(seen: View, sensor: str) -> Array:
@@ -84,13 +112,16 @@ def _peaks_title(seen: View, sensor: str) -> str:
     assert seen.x is not None
     counts, grid = _counts(seen, sensor), seen.plane(seen.results.of_sensor("peaks_per_cycle", sensor))
     usual, name = int(Counter(counts.tolist()).most_common(1)[0][0]), sensor.replace("_", " ")
+    if (first := set(np.atleast_1d(grid[0])[np.isfinite(np.atleast_1d(grid[0]))].tolist())) and len(first) == 1:
+        usual = int(*first)
     broken = (np.isfinite(grid) & (grid != usual)).reshape(len(grid), -1).any(axis=1)
     fine = np.flatnonzero(np.cumsum(broken) == 0)
     if seen.is_sampled or not fine.size:
         return f"{name} has {counts.min():.0f} to {counts.max():.0f} peaks per cycle, most often {usual}"
     until = seen.x.in_words(float(seen.along(seen.x)[fine[-1]]) / seen.x.factor)
     others = listed([f"{count:.0f}" for count in np.unique(counts) if count != usual])
-    return f"{name} has {counted(usual, 'peak')} per cycle up to {until}; beyond, also {others}"
+    also = "also " if (grid[fine[-1] + 1 :] == usual).any() else ""
+    return f"{name} has {counted(usual, 'peak')} per cycle up to {until}; beyond, {also}{others}"
 
 
 def _typical(results: Results, sensor: str) -> list[Index]:
@@ -229,8 +260,17 @@ def _held_mass(seen: View, mass: float | None) -> float | None:
 
 
 def _count(seen: View, sensor: str) -> Figure:
-    caption = seen.caption("Number of peaks in the last cycle; lines: n Ω = ωₑ.")
-    return draw(f"peaks-{sensor}", _peaks_title(seen, sensor), caption, 2.4, partial(_draw_count, seen, sensor))
+    """Steps along the one axis that changes the number of peaks."""
+    counts = seen.results.of_sensor("peaks_per_cycle", sensor)
+    shown, alike = seen, ""
+    if seen.y is not None and not seen.is_sampled:
+        striped = [axis for axis in (seen.x, seen.y) if axis is not None]
+        flat, along = sorted(striped, key=lambda axis: seen.most_along(axis, counts))
+        alike = f"The same for {flat.noun} {flat.span}."
+        shown = View(seen.results, along, None, {**seen.held, flat.dim: 0})
+    lines = "; lines: where a harmonic meets the natural frequency, n Ω = ωₑ" if _ratios(shown)[0] is not None else ""
+    caption = seen.caption(f"Number of peaks in the last cycle{lines}.", alike)
+    return draw(f"peaks-{sensor}", _peaks_title(shown, sensor), caption, 2.4, partial(_draw_count, shown, sensor))
 
 
 def _draw_count(seen: View, sensor: str, drawing: Drawing) -> None:
@@ -254,23 +294,24 @@ def _ratio(seen: View, variable: str, sensors: list[str]) -> list[Figure]:
             tops[sensor] = float(np.nanmax(plane, initial=0.0))
     if not tops:
         return []
-    name, title, caption = RATIOS[variable]
+    name, title, _, caption = RATIOS[variable]
     best = max(tops, key=lambda sensor: tops[sensor])
-    top = title.format(number(tops[best]), best.replace("_", " "))
+    what = f"{seen.results.noun(best)} {seen.results.place(best)}"
+    top = title.format(value=number(tops[best]), what=what)
     height, fill = 0.6 + 2.2 * len(tops), partial(_draw_rows, seen, list(tops), variable)
     return [draw(name, top, seen.caption(caption), height, fill)]
 
 
 def _draw_rows(seen: View, sensors: list[str], variable: str, drawing: Drawing) -> None:
     rows = drawing.subplots(len(sensors), 1, squeeze=False, sharex=True)[:, 0]
-    words = variable.replace("_", " ").replace("ratio", "harmonics")
+    words = RATIOS[variable][2]
     for axes, sensor in zip(rows, sensors, strict=True):
         curves = seen.curves(seen.results.of_sensor(variable, sensor))
         draw_curves(axes, seen, curves)
-        values = np.concatenate([curve.y[np.isfinite(curve.y)] for curve in curves])
-        if values.size and values.min() > 0.0 and values.max() > 30.0 * values.min():
+        values = np.concatenate([curve.y[curve.y > LEAST_RATIO] for curve in curves])
+        if values.size and values.max() > 30.0 * values.min():
             logarithmic(axes.yaxis)
-            axes.set_ylim(bottom=max(0.5 * float(values.min()), LEAST_RATIO))
+            axes.set_ylim(bottom=0.5 * float(values.min()))
         axes.set_title(sensor.replace("_", " "))
         axes.set_ylabel(f"{words}\n{seen.results.place(sensor)}")
     one_legend(list(rows))
@@ -279,9 +320,13 @@ def _draw_rows(seen: View, sensors: list[str], variable: str, drawing: Drawing) 
 
 
 def _harmonics(results: Results, sensor: str, shown: list[Index]) -> Figure:
-    caption = f"Amplitudes 2|c_k| of the last cycle of {sensor}, in the variants of the first figure."
-    sizes = np.nan_to_num(results.of_sensor("harmonic", sensor).values[shown[-1]])[1:]
-    title = f"Harmonic {int(np.argmax(sizes)) + 1} of the cycle is the largest in {sensor.replace('_', ' ')}"
+    name = sensor.replace("_", " ")
+    caption = f"Amplitudes 2|c_k| of the last cycle of {name}, in the variants of the first figure."
+    stored = results.of_sensor("harmonic", sensor).transpose(*results.dims, ...).values
+    strongest = [str(int(np.argmax(np.nan_to_num(stored[index])[1:])) + 1) for index in shown]
+    title = f"Harmonic {strongest[0]} of the cycle is the largest in {name}"
+    if len(set(strongest)) > 1:
+        title = f"The largest harmonics of the cycle in {name} are {listed(strongest)}, from slow to fast"
     return draw("harmonics", title, caption, 2.4, partial(_draw_harmonics, results, sensor, shown))
 
 

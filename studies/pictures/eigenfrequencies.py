@@ -12,7 +12,7 @@ from studies.at_rest.findings import FREQUENCY_WANTED, frequency_errors, moves_n
 from studies.pictures import at_rest
 from studies.pictures.common.figures import HAIR, INK, MUTED, Figure, draw, legend_of_all, shades, widen
 from studies.pictures.common.sweep_view import View
-from studies.results.formatting import ALIKE, number, quantity
+from studies.results.formatting import ALIKE, listed, number, quantity
 from studies.results.results import Results
 
 SWEPT_MODES = 3  # with a panel over the sweep
@@ -114,7 +114,7 @@ def _shapes(results: Results) -> Figure:
     height = 0.4 + 1.35 * count
     base = results.dataset["base_frequency"]
     at = quantity(float(base["position"][0]), "m")
-    told = ", ".join(number(float(value), 4) for value in base.values[0, :count])
+    told = listed([number(float(value), 4) for value in base.values[0, :count]])
     title = f"With {results.carriage_name} at {at} the system vibrates at {told} Hz"
     return draw("shapes", title, caption, height, partial(_draw_shapes, results, count))
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -48,6 +48,8 @@ PAGE = "report.html"
 TEMPLATES = Path(__file__).parent / "templates"
 LONG_TEXT = 120
 EVERYWHERE = "in every variant"
+UNIT = re.compile(r"(?<=\d) (?=(?:%|[nµmkMG]?(?:m|N|Pa|Hz|s|g|J|rad|t)\b))|(?<=\d [nµmkMG]N) (?=m\b)|(?<=\d N) (?=m\b)")
+SENTENCE = re.compile(r"(?<=\.) (?=[A-Z])")  # between two sentences
 MOST_OPEN = 6  # figures of the question that stand unfolded
 
 
@@ -71,10 +73,12 @@ class Drawn(NamedTuple):
 
 @dataclass(frozen=True)
 class Finding:
-    """One sentence of the answer; subject: the sensor, carriage or envelope that it is about, or ""."""
+    """A statement of the answer; subject: the sensor, carriage or envelope that it is about, or "". more: the sentences
+    behind its first one, where this stands alone."""
 
     subject: str
     text: str
+    more: str = ""
 
 
 def write_report(archive: Path | str, folder: Path | str) -> Path:
@@ -139,18 +143,21 @@ def page_of(source: Archive, results: Results, drawn: Sequence[Drawn], of_questi
     """
     kind = kind_named(results.study.kind)
     open_figures = min(of_question, MOST_OPEN)
+    findings = [_finding(results, text) for text in found_of(results)]
     return SimpleNamespace(
         title=results.study.title or str(source.root.attrs.get("title", "")) or kind.name,
         question=kind.question,
         noun=noun(source.root),
         facts=_facts(results, noun(source.root)),
-        findings=[_finding(results, text) for text in found_of(results)],
+        lead=_lead(findings[0]) if findings else None,
+        findings=findings[1:],
         accuracy=_sentence(told_accuracy(source.groups.get(audit.GROUP), results)),
         exactness=_exactness(source, results),
         figures=drawn[:open_figures],
         more_figures=drawn[open_figures:of_question],
         method_figures=drawn[of_question:],
-        statuses=_statuses(results, noun(source.root)),
+        statuses=_statuses(results),
+        lost=not all(status.values_kept for status in results.status_counts),
         scene=_scene(results),
         sweep=[_sweep_row(results, place) for place in range(len(results.axes))],
         results=_results(results),
@@ -188,13 +195,18 @@ def page_template(name: str) -> Template:
 
 
 def _soft(text: str) -> Markup:
-    """Text that may break after an underscore."""
-    return Markup("_<wbr>").join(escape(part) for part in text.split("_"))
+    """A name or key that may break after an underscore and a dot."""
+    return Markup(re.sub(r"(_|\.(?=\w))", r"\1<wbr>", str(escape(text))))
 
 
 def _minus(text: str) -> str:
-    """Numbers with a true minus sign."""
-    return re.sub(r"(?<![\w.-])-(?=\d)", "\N{MINUS SIGN}", text)
+    """Numbers with a true minus sign, and on one line with their unit.
+
+    >>> _minus("-1.5 kN m at 12 % of 3 m/s, 2 modes").replace("\N{NO-BREAK SPACE}", "_").replace("\N{MINUS SIGN}", "~")
+    '~1.5_kN_m at 12_% of 3_m/s, 2 modes'
+    """
+    text = re.sub(r"(?<![\w.-])-(?=\d)", "\N{MINUS SIGN}", text)
+    return UNIT.sub("\N{NO-BREAK SPACE}", text)
 
 
 def _unbroken(text: str) -> str:
@@ -219,7 +231,7 @@ def _facts(results: Results, noun: str) -> list[Row]:
     """The run in a line."""
     fine = results.status_counts.get(Status.OK, 0)
     counts = [Row(f"{noun}s", f"{results.variants:,}"), Row("status ok", f"{fine:,}")]
-    return [Row("kind of study", results.study.kind), *(counts if _statuses(results, noun) else ())]
+    return [Row("kind of study", results.study.kind), *(counts if results.size > 1 or _statuses(results) else ())]
 
 
 def _finding(results: Results, text: str) -> Finding:
@@ -229,9 +241,15 @@ def _finding(results: Results, text: str) -> Finding:
     return Finding("", text)
 
 
-def _statuses(results: Results, noun: str) -> list[Row]:
-    """How many have which status; nothing where a study that measures is one whole, and well."""
-    if noun == "point" and results.size == 1 and set(results.status_counts) == {Status.OK}:
+def _lead(first: Finding) -> Finding:
+    """The first statement with its first sentence alone: what stands in large letters is short."""
+    text, *more = SENTENCE.split(first.text, 1)
+    return replace(first, text=text, more="".join(more))
+
+
+def _statuses(results: Results) -> list[Row]:
+    """How many have which status; nothing where all are well, which the facts say."""
+    if set(results.status_counts) == {Status.OK}:
         return []
     return [Row(label(status), f"{count:,}", status.message) for status, count in results.status_counts.items()]
 
@@ -269,24 +287,31 @@ def _rows(results: Results, here: str, table: Mapping[str, Any], swept: Mapping[
 
 
 def _row(results: Results, path: str, value: Any, swept: Mapping[str, str]) -> Row:
-    text = value if isinstance(value, str) else _plain(value)
+    text = _in_words(results, path, value)
+    remark = f"swept: {swept[path]}" if path in swept else ""
+    return Row(path.rsplit(".", 1)[-1], text if len(text) <= LONG_TEXT else f"{text[: LONG_TEXT - 1]}…", remark)
+
+
+def _in_words(results: Results, path: str, value: Any) -> str:
+    """A value of the study file with its unit, which texts have already; tables in a list with those of their own."""
+    if isinstance(value, list | tuple) and any(isinstance(item, dict) for item in value):
+        return "; ".join(_in_words(results, f"{path}.{place}", item) for place, item in enumerate(value))
+    if isinstance(value, dict):
+        return ", ".join(f"{key} {_in_words(results, f'{path}.{key}', item)}" for key, item in value.items())
+    if isinstance(value, str):
+        return value
     try:
         unit = results.study.unit(path)
     except (KeyError, ValueError, TypeError):
         unit = None
-    if unit is not None and unit.symbol and not isinstance(value, str):
-        text = f"{text} {unit_text(unit.symbol)}"
-    remark = f"swept: {swept[path]}" if path in swept else ""
-    return Row(path.rsplit(".", 1)[-1], text if len(text) <= LONG_TEXT else f"{text[: LONG_TEXT - 1]}…", remark)
+    return f"{_plain(value)} {unit_text(unit.symbol) if unit is not None else ''}".strip()
 
 
 def _plain(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, list | tuple):
-        return ("; " if any(isinstance(item, dict) for item in value) else ", ").join(map(_plain, value))
-    if isinstance(value, dict):
-        return ", ".join(f"{key} {_plain(item)}" for key, item in value.items())
+        return ", ".join(map(_plain, value))
     return number(value, 9) if isinstance(value, float) else str(value)
 
 

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 SOME_NOT_OK = 3
 ENERGY = "energy_change"  # of frames that move
+LEAST_TOLD = 1e-5  # of a value: smaller errors say nothing beside four digits of it
 
 
 @dataclass(frozen=True)
@@ -84,8 +85,9 @@ class Range:
         return quantity(value, self.units, digits, beside=max(abs(self.extreme.value), self.beside))
 
     def said(self, end: Extreme, digits: int = 3) -> str:
-        """One of its ends with the unit, and what that may be off where that is known."""
-        off = f" ± {quantity(end.error, self.units, 2)}" if np.isfinite(end.error) and end.error > 0.0 else ""
+        """One of its ends with the unit, and what that may be off where that is known and not beneath its digits."""
+        beneath = LEAST_TOLD * abs(end.value)
+        off = f" ± {quantity(end.error, self.units, 2)}" if np.isfinite(end.error) and end.error > beneath else ""
         return f"{self.value(end.value, digits)}{off}"
 
 

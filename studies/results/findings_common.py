@@ -53,7 +53,8 @@ def told_hanging(results: Results, sensors: Sequence[str]) -> str:
     """Of which sensors of a figure displacements point down, as a sentence; "" where none does."""
     down = [name for name in sensors if results.hangs(name)]
     sideways = [name for name in sensors if results.sensors[name] == "m" and name not in down]
-    return hanging(down, sideways)
+    told = hanging(down, sideways)
+    return told if float(results.study.gravity) > 0.0 else told.replace(", as the body hangs", "")
 
 
 def hanging(down: Sequence[str], sideways: Sequence[str]) -> str:

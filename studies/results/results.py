@@ -175,7 +175,8 @@ class Results:
         """Where a sensor reads, and in which direction where it names one, in words."""
         own = self.study.sensor[sensor]
         if own.rides is not None:
-            return f"{'under' if own.under else 'of'} {own.rides}"
+            spot = f"at {own.contact} " if own.contact else ""
+            return f"{spot}{'under' if own.under else 'of'} {own.rides}"
         if own.at is None:
             return f"at {own.node or own.point}{own.way_in_words}"
         swept = any(f"sensor.{sensor}.at" in axis.paths for axis in self.axes)

@@ -47,7 +47,7 @@ def test_findings_of_an_asymmetry_name_the_largest_and_its_place() -> None:
     cycle = 2.0 * (4.6 * 0.8 + np.pi * 0.46) / dataset.pace
     first = np.pi**2 / 10.0**2 * np.sqrt(210e9 * 8e-6 / 78.5)
     settled = np.exp(-dataset.damping_ratio * first / (1.0 + 2.0 * dataset.mass_ratio) * cycle) <= 0.01
-    assert f"In {int((~settled).sum())} of 12 variants more than 1 % of the start is left" in text
+    assert f"In {int((~settled).sum())} of 12 variants more than 1 % of the start's vibration is left" in text
     assert f"from pace {float(dataset.pace.where(~settled).min()):.3g} m/s on" in text
     odd = dataset.odd_rms.where(settled)
     assert float(odd.max()) < float(dataset.odd_rms.max())

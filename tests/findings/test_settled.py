@@ -64,6 +64,7 @@ def test_double_peaks_say_what_the_start_still_holds_and_how_many_cycles_it_take
     rate = ZETA * OMEGA / 1.2
     (told,) = told_unsettled(results_of(swing(0.5, 0.2, 0.5, 3)))
     enough = int(np.ceil(1.0 - np.log(1e-3) / (rate * 2.0)))
-    assert told.startswith("In 1 of 1 variant more than 0.1 % of the start is left") and f"; {enough} cycles" in told
+    assert told.startswith("In 1 of 1 variant more than 0.1 % of the start's vibration is left")
+    assert f"; {enough} cycles" in told
     assert f"at most {percent(float(np.exp(-rate * 4.0)))} of it" in told
     assert told_unsettled(results_of(swing(0.5, 0.2, 0.5, enough))) == []

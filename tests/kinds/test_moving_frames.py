@@ -357,13 +357,13 @@ def test_a_limit_is_told_with_where_it_is_exceeded() -> None:
     found = studies.run(study)
     most = np.maximum(abs(found["tip_max"]), abs(found["tip_min"])).values
     assert (np.diff(most) > 0.0).all()
-    assert "tip: from " in kind_of(study).findings(Results.of(found))[0]
+    assert "tip: the displacement goes from " in kind_of(study).findings(Results.of(found))[0]
     assert "exceeds 10 m nowhere from 0.25 rad/s to 1 rad/s" in kind_of(study).findings(Results.of(found))[0]
     limit = float(np.round(0.5 * (most[0] + most[1]), 3))
     found = studies.run(study.with_values({"question.displacement": limit}))
     told = kind_of(study).findings(Results.of(found))
     assert f"exceeds {quantity(limit, 'm')} from 0.5 rad/s to the end of the sweep, 1 rad/s" in told[0]
-    assert told[1].startswith("root: from ") and "exceeds" not in told[1]
+    assert told[1].startswith("root: the ") and "exceeds" not in told[1]
     assert any(text.startswith("The energy of everything (motion, bending") for text in told)
     sizes = next(one for one in pictures(Results.of(found)) if one.name == "largest-displacement")
     assert "beyond the limit" in sizes.title and "Red: limits" in sizes.caption

@@ -20,6 +20,7 @@ from studies.results.results import Results
 from studies.runs.audit import relative_errors
 
 LEAST = 1e-6  # what is smaller stands there, at the end of the logarithmic axis
+LEAST_POINTS = 2  # of a figure: a single number is a sentence
 MOST_RESULTS = 18  # that are shown: first those that are nearest to their tolerances, then those without one
 
 
@@ -73,7 +74,7 @@ def _title(nearest: Told) -> str:
         return "No result is held to a tolerance"
     times, share = nearest.largest / nearest.tolerance, percent(nearest.missed)
     if nearest.largest <= nearest.tolerance:
-        within = "All errors that are held are estimated within their tolerances"
+        within = "All estimated errors that have a tolerance are within it"
         return f"{within}; {nearest.name} comes nearest, at {percent(times)}"
     return f"{nearest.name} may miss its tolerance in {share} of the variants, {number(times, 2)} times at most"
 
@@ -107,8 +108,9 @@ def compared(group: xr.Dataset | None) -> list[Figure]:
         return []
     pairs = np.maximum(np.stack([told[both], observed[both]]), LEAST)
     times, variants = pairs[1] / pairs[0], counted(int(both.any(axis=1).sum()), "variant")
-    enough = percent(float(np.mean(times <= 1.0)))
-    title = f"Of {counted(times.size, 'audited number')} {enough} are no further off than estimated"
+    beyond = int(np.count_nonzero(times > 1.0))
+    some = f"All but {beyond:,} of {counted(times.size, 'audited number')} are"
+    title = f"{some if beyond else f'All {times.size:,} audited numbers are'} no further off than estimated"
     caption = f"{variants}, a dot for every reported number; below the line its estimate was large enough."
     if times.max() > 1.0:
         worst = np.broadcast_to(group["result"].values, both.shape)[both][np.argmax(times)]
@@ -137,9 +139,10 @@ def _draw_compared(pairs: Array, held: Mask, tolerances: Array, drawing: Drawing
 
 
 def observed(results: Results, group: xr.Dataset | None) -> list[Figure]:
-    """One figure of the observed errors along the sweep; none without an audit or a sweep, or where nothing is held."""
+    """One figure of the observed errors along the sweep; none without an audit or a sweep, or where of fewer than two
+    variants anything is held: sentences tell these."""
     axis = results.axis(*PACES) or next((axis for axis in results.axes if len(axis.values) > 1), None)
-    if group is None or axis is None or not np.isfinite(relative_errors(group)).any():
+    if group is None or axis is None or np.isfinite(_worst(relative_errors(group))).sum() < LEAST_POINTS:
         return []
     worst = float(np.nanmax(relative_errors(group)))
     title = f"The audit found errors of at most {number(worst, 2)} times the tolerance"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -37,22 +38,37 @@ def response(results: Results, ranked: list[str], limits: Limits, shown: list[In
     ranked: sensors, the most telling first. top: the variant of the answer."""
     sensors = ranked[:MOST_SENSORS]
     first, own = sensors[0], shown[-1]
-    way = over_way(results, first, own)
-    at = int(np.argmax(np.abs(way.values)))
-    value = quantity(float(way.values[at]), results.sensors[first])
-    where = quantity(float(way.position[at]), "m")
-    title = f"{first.replace('_', ' ')} reaches {value} when {results.carriage_name} has come to {where}"
+    value, place = _reached(results, first, own)
+    said, where = quantity(value, results.sensors[first]), quantity(place, "m")
+    title = f"{first.replace('_', ' ')} reaches {said} when {results.carriage_name} has come to {where}"
     whose = "the variant of the answer" if own == top else "the kept history with the largest value"
     errors = {sensor: results.error_at(sensor, own) for sensor in sensors}
     loose = [f" {name.replace('_', ' ')}: estimated to within {percent(e)}." for name, e in errors.items() if e > LOOSE]
     caption = (
         (f"Brightest line: {whose}. " if len(shown) > 1 else "")
-        + f"Over the way of {results.carriage_name}; grey: it has left, and would have come so far."
+        + f"Over the way of {results.carriage_name}."
         + (f" {hang}" if (hang := told_hanging(results, sensors)) else "")
         + "".join(loose)
     )
     height = 0.8 + 1.9 * len(sensors)
-    return telling_limits(draw("response", title, caption, height, partial(_draw, results, sensors, limits, shown)))
+    figure = draw("response", title, caption, height, partial(_draw, results, sensors, limits, shown))
+    if any(axes.patches for axes in figure.drawing.axes):
+        grey = f"Grey: {results.carriage_name} has left, and would have come so far."
+        figure = replace(figure, caption=f"{figure.caption} {grey}")
+    return telling_limits(figure)
+
+
+def _reached(results: Results, sensor: str, index: Index) -> tuple[float, float]:
+    """The value of largest size of one variant and the place of the first carriage then: of all steps, where that is
+    known, else of the history."""
+    way = over_way(results, sensor, index)
+    at = int(np.argmax(np.abs(way.values)))
+    end = f"{sensor}_{'max' if way.values[at] >= 0.0 else 'min'}"
+    if f"{end}_position" in results.dataset:
+        value, place = (float(results.row(results.dataset[name], index)) for name in (end, f"{end}_position"))
+        if np.isfinite(place):
+            return value, place
+    return float(way.values[at]), float(way.position[at])
 
 
 def _draw(results: Results, sensors: list[str], limits: Limits, shown: list[Index], drawing: Drawing) -> None:
