@@ -103,10 +103,9 @@ def standing(timeline: Timeline, counts: Array | Counts) -> Along:
 
 
 def frozen(model: SceneModel, places: Array) -> Along:
-    """The ways of all riders at rest, with the first carriage at `places` (S,) in m along its track and every other one
-    where it starts; whoever is off the body does not touch it."""
-    starts = [np.full_like(places, float(c.rider.motion.path(0.0).S)) for c in model.carriages]
-    along = [places, *starts[1:]]
+    """The ways of all riders at rest, with the first carriage at `places` (S,) in m along its track, the other axles of
+    its train behind it, and every other one where it starts; whoever is off the body does not touch it."""
+    along = [_standing(model, carriage.name, places) for carriage in model.carriages]
     owners = {load.rider: number for number, carriage in enumerate(model.carriages) for load in carriage.loads}
     still, found = np.zeros_like(places), []
     for number, rider in enumerate(model.riders):
@@ -116,6 +115,15 @@ def frozen(model: SceneModel, places: Array) -> Along:
             StationPath(np.where(here, np.clip(place, 0.0, rider.length), 0.0), still, still, bool(here.any()), here)
         )
     return tuple(found)
+
+
+def _standing(model: SceneModel, name: str, places: Array) -> Array:
+    """(S,) where a carriage stands while the first is at `places`: axles keep their distances."""
+    trains, first, carriage = model.study.axles, model.carriages[0].name, model.study.carriage[name]
+    start, end = (float(carriage.motion.path(tau).S) for tau in (0.0, carriage.motion.duration))
+    ahead = places if name == first or (name in trains and trains[name] == trains.get(first)) else start
+    behind = np.sign(end - start) * (carriage.headway or 0.0) if name in trains else 0.0
+    return np.asarray(np.full_like(places, ahead) - behind)
 
 
 def _way(rider: Rider, segment: Segment, tau: Array, active: bool, highest: int) -> StationPath:

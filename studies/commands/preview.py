@@ -1,7 +1,7 @@
 """What a run would do, from its plan and a few seconds of measuring: the scene, the work and its time, as tables."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import singledispatch
 from typing import Any
@@ -23,6 +23,7 @@ from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
 from studies.commands import planned_numerics as chosen
 from studies.commands.forecast import AROUND, Forecast, forecast
+from studies.commands.sampled import sampled
 from studies.findings.in_step import speeds_in_step
 from studies.protocol.parts import Foreseen, Pieces, TextTable, Variants
 from studies.results.findings_common import has_dampers, told_trains
@@ -96,6 +97,7 @@ def _of_pieces(parts: Pieces, threads: int) -> Preview:
     rows = [("kind", study.kind), ("asks", kind.question), ("pieces", str(len(pieces)))]
     cases, around = expand(study), AROUND * time.process_time()
     seen = kind.foreseen(study, threads, parts.audited)
+    each = {} if seen else sampled(pieces, threads)
     if kind.sweeps:
         rows.insert(1, ("variants", f"{cases.size:,}"))
         rows += told_trains(study)
@@ -103,26 +105,23 @@ def _of_pieces(parts: Pieces, threads: int) -> Preview:
         TextTable(study.title or study.source.name, ("", ""), rows),
         *(_of_scene(seen.study if seen else study, cases) if kind.sweeps else ()),
         *kind.tables(study),
-        seen.table if seen else _work(parts),
+        seen.table if seen else _work(parts, each),
     )
-    cost = _measured(seen, around, threads) if seen else _expected(parts)
+    cost = _measured(seen, around, threads) if seen else _expected(parts, around + sum(each.values()), threads)
     if kind.audit_seconds:
         cost += _audited(parts.audited, study.solver.audit)
     remarks = [*parts.remarks, *([seen.remark] if seen and seen.remark else [])]
     return Preview(tuple(table for table in tables if table.rows), cost, tuple(remarks))
 
 
-def _work(parts: Pieces) -> TextTable:
+def _work(parts: Pieces, seconds: Mapping[str, float]) -> TextTable:
     """Pieces with the time that each takes."""
-    work = [(piece.name, piece.words, duration(piece.seconds)) for piece in parts.pieces]
+    work = [(piece.name, piece.words, duration(seconds[piece.name])) for piece in parts.pieces]
     return TextTable("Pieces, each kept when it is finished", ("piece", "what it does", "about"), work)
 
 
-def _expected(parts: Pieces) -> str:
-    seconds = sum(piece.seconds for piece in parts.pieces)
-    return (
-        f"About {duration(seconds)} on two cores of an ordinary server, at most {size(parts.disk_bytes)} on the disk."
-    )
+def _expected(parts: Pieces, seconds: float, threads: int) -> str:
+    return f"About {duration(seconds)} on {counted(threads, 'thread')}, at most {size(parts.disk_bytes)} on the disk."
 
 
 def _measured(seen: Foreseen, around: float, threads: int) -> str:

@@ -17,7 +17,7 @@ from studies.findings.beyond import Limits
 from studies.moving import findings
 from studies.moving.parts import AUDIT_SECONDS, gather
 from studies.moving.variables import RESULTS
-from studies.protocol.parts import Piece, Work
+from studies.protocol.parts import Foreseen, Piece, Work
 from studies.protocol.study import PiecedKind, question_of
 from studies.results.results import Results
 
@@ -70,6 +70,11 @@ class MovingFrames(PiecedKind):
         from studies.moving.parts import again
 
         return again(study, _duration(study), variants, work)
+
+    def foreseen(self, study: Study, threads: int, audited: int) -> Foreseen:
+        from studies.moving.preview import foreseen
+
+        return foreseen(study, _duration(study), threads, audited)
 
     def remarks(self, study: Study) -> Sequence[str]:
         from studies.moving.parts import remarks

@@ -1,5 +1,6 @@
 """Studies of bodies whose frames move: from the study file to the dataset and its sentences."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,12 +17,13 @@ from results_schema.errors import BadInput
 from results_schema.status import Status
 from results_schema.store.archive import open_archive
 from studies.commands.catalogue import built_in
+from studies.commands.preview import preview
 from studies.kinds.sliding_mass import KIND
 from studies.moving.parts import periods
 from studies.pictures.moving_frames import pictures
 from studies.protocol.options import RunOptions
 from studies.protocol.study import kind_of
-from studies.results.formatting import quantity
+from studies.results.formatting import quantity, spanned
 from studies.results.results import Results
 from studies.runs.runner import run_to_archive
 from tests.floating.scenes import ARM, PAPER_BEAM, sliding_mass
@@ -338,6 +340,18 @@ def test_numbers_of_loads_and_springs_may_be_swept() -> None:
             Study(kind="moving-frames", gravity=0.0, question={"duration": 4.0}, **tables).with_values(own)
         )
         assert found["tip_max"].values[place] == pytest.approx(float(alone["tip_max"]), rel=1e-9)
+
+
+def test_a_check_forecasts_by_pieces_that_it_computes() -> None:
+    """What these were marched with is what a run marches them with; it takes as long for each more."""
+    study = paper(2.0)
+    found, shown = studies.run(study), preview(kind_of(study).parts(study), 1)
+    table = next(table for table in shown.tables if table.title == "What 1 piece of 1 took, as in a run")
+    ((variants, modes, steps, error, status),) = table.rows
+    used = found["steps_used"].values
+    assert (variants, modes, status) == ("0 to 3", "1", "ok")
+    assert steps == spanned(used.reshape(-1).astype(float)) and float(error) < 0.01
+    assert re.match(r"About \S+ m?s on 1 thread, about .* for the archive", shown.cost)
 
 
 def test_a_limit_is_told_with_where_it_is_exceeded() -> None:

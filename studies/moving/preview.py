@@ -1,0 +1,111 @@
+"""What a run of a study of frames that move will take, from some of its pieces, which are computed as it does."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from engine.march.stepper import Halted
+from results_schema.status import Status, label
+from studies.moving.parts import AUDIT_SECONDS, again, pieces, scenes
+from studies.protocol.parts import Foreseen, Piece, TextTable, Work
+from studies.protocol.stopping import AskedElsewhere
+from studies.results.formatting import counted, listed, scientific, spanned
+from studies.results.places import spread
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from engine.scene.study import Study
+    from results_schema.arrays import Array, Mask
+    from studies.moving.parts import Scene
+
+PATIENCE = 10.0  # s of measuring, in which one piece is to be finished
+MEASURED = 3  # pieces, as many as half of that leaves room for
+UNFINISHED = 2.0  # times the seconds in which a piece was not done that it takes
+HEADINGS = ("variants", "modes of all bodies", "steps", "estimated error", "status")
+
+
+def foreseen(
+    study: Study, duration: Callable[[Mapping[str, Array], int], Array], threads: int, audited: int
+) -> Foreseen:
+    """What a run takes, by some of its pieces and one audited variant; duration: (V,) s of variants by columns."""
+    from engine.scene.sweep import expand
+
+    everything, own = pieces(study, duration), scenes(study, expand(study))
+    _compile(own[0])
+    begun = time.perf_counter()
+    found = _computed(everything, threads)
+    took = time.perf_counter() - begun
+    known = [everything[number] for number in found] or everything[:1]
+    share = sum(piece.seconds for piece in known) / sum(piece.seconds for piece in everything)
+    seconds = (took if found else UNFINISHED * took) / share
+    if audited:
+        at_once = np.ceil(min(audited, len(own)) / threads)
+        each = _audit(study, duration, own[0], threads) if found else None
+        seconds += at_once * each if each else AUDIT_SECONDS * audited * seconds / expand(study).size
+    less = "" if found else f"{PATIENCE:.0f} seconds were not enough for a piece of it: this may take longer"
+    title = f"What {counted(len(found), 'piece')} of {len(everything):,} took, as in a run"
+    rows = [_row(part, _held(study)) for part in found.values()]
+    size = sum(part.nbytes for part in found.values()) / share
+    return Foreseen(study, TextTable(title, HEADINGS, rows), float(seconds), int(size), less)
+
+
+def _compile(scene: Scene) -> None:
+    """A march of two steps, so that what is measured begins with kernels."""
+    from engine.floating.converge import levels, weights
+    from engine.floating.march import march
+    from engine.floating.model_choice import FIRST_MODES
+    from engine.scene.variants import VariantValues
+
+    level = next(iter(levels(scene.study, 1.0, FIRST_MODES)))
+    values = VariantValues(scene.study, {}, 1)
+    march(level.model, values, np.full(1, 2.0 / level.steps), 2, np.array([0, 2]), weights(level.scheme))
+
+
+def _computed(everything: Sequence[Piece], threads: int) -> dict[int, xr.Dataset]:
+    """Some pieces by their numbers, as far as there is time."""
+    begun, found = time.perf_counter(), dict[int, "xr.Dataset"]()
+    work = Work(threads, AskedElsewhere(lambda: time.perf_counter() > begun + PATIENCE))
+    for number in spread(len(everything), MEASURED):
+        if found and time.perf_counter() > begun + 0.5 * PATIENCE:
+            break
+        try:
+            found[number] = everything[number].compute(work)
+        except Halted:
+            break
+    return found
+
+
+def _audit(
+    study: Study, duration: Callable[[Mapping[str, Array], int], Array], scene: Scene, threads: int
+) -> float | None:
+    """Seconds of one audited variant; None where there is no time for it."""
+    begun = time.perf_counter()
+    work = Work(threads, AskedElsewhere(lambda: time.perf_counter() > begun + PATIENCE))
+    try:
+        again(study, duration, scene.variants[:1], work)
+    except Halted:
+        return None
+    return time.perf_counter() - begun
+
+
+def _held(study: Study) -> Mask:
+    """(R,) results that are held to a tolerance."""
+    from engine.floating.model import build
+    from engine.floating.results import results_of
+
+    return np.isfinite([result.tolerance for result in results_of(build(study.without_sweep(), 2))])
+
+
+def _row(part: xr.Dataset, held: Mask) -> tuple[str, ...]:
+    """What the variants of a piece were marched with; held: results (R,) that count."""
+    error, status = part["estimated_error"].values[:, held], np.unique(part["status"].values)
+    worst = scientific(float(np.nanmax(error))) if np.isfinite(error).any() else ""
+    words = listed([label(Status(int(one))) for one in status])
+    variants = f"{int(part['number'].values[0]):,} to {int(part['number'].values[-1]):,}"
+    modes = spanned(part["modes_used"].values.astype(float))
+    return variants, modes, spanned(part["steps_used"].values.astype(float)), worst, words
