@@ -112,7 +112,7 @@ def check_targets(study: Study, name: str, axis: SweepAxis) -> None:
             current = study
         open_ = current in (None, "auto")
         if isinstance(current, bool) or not (open_ or isinstance(current, int | float)):
-            known = list(study.numbers())
+            known = [key for key in study.numbers() if not _axle_that_would_leave(study, key)]
             longer = [key for key in known if key.endswith(f".{path}")]
             remedy = nearest(longer[0], longer) if longer else nearest(path, known)
             if several := fnmatch.filter(known, path) if "*" in path else []:
@@ -121,6 +121,9 @@ def check_targets(study: Study, name: str, axis: SweepAxis) -> None:
             raise study.source.fault(
                 here, what, expected="the key of a number", received=shortened(path), remedy=remedy
             )
+        if axle := _axle_that_would_leave(study, path):
+            what, remedy = "an axle moves with its train", f'of = "{axle}" moves all axles'
+            raise study.source.fault(here, what, expected="a number of the train", received=path, remedy=remedy)
         if not study.targets(path):
             raise study.source.fault(
                 here,
@@ -129,6 +132,15 @@ def check_targets(study: Study, name: str, axis: SweepAxis) -> None:
                 received=shortened(path),
                 remedy="a study file for each",
             )
+
+
+def _axle_that_would_leave(study: Study, path: str) -> str:
+    """The key of a train whose axle alone a key would move otherwise, "" where it does not."""
+    table, _, rest = path.partition(".")
+    name, _, key = rest.partition(".")
+    if table != "carriage" or name not in study.axles or not key.startswith(("motion", "headway")):
+        return ""
+    return f"train.{study.axles[name]}.{key.replace('headway', 'spacing')}"
 
 
 def _ends(study: Study, name: str, axis: SweepAxis) -> Range:

@@ -250,7 +250,7 @@ def _held_accuracy(group: xr.Dataset | None, results: Results) -> str:
     estimates, tolerances = known(of_variants(results, ERROR)[fine]), known(results.dataset["tolerance"])
     if not tolerances.size and group is not None and Verdict.of(group).count:
         return f"nothing is held to a tolerance; {_unheld(group, results)}."
-    if not tolerances.size or (group is None and not estimates.size):
+    if not tolerances.size:
         return ""
     errors = "estimated errors" if fine.all() else "estimated errors of those that are ok"
     found = f"{errors} at most {scientific(float(estimates.max()))}" if estimates.size else "no status is ok"

@@ -167,7 +167,11 @@ def test_one_variant_as_a_study_of_its_own() -> None:
             '[carriage.tram_2]\non = "bed"\nkind = "mass"\n[sensor.midspan]',
             ["carriage.tram_2", "two carriages", "train.tram"],
         ),
-        ("[sweep]", '[sweep]\nall = { of = "carriage.tram_2.motion.speed", values = [1] }', ["sweep.speed", "twice"]),
+        (
+            "[sweep]",
+            '[sweep]\nall = { of = "carriage.tram_2.motion.speed", values = [1] }',
+            ["sweep.all.of", "moves with its train"],
+        ),
         (
             "[sweep]",
             '[sweep]\nend = { of = "train.tram.motion.end", values = [0] }',
@@ -253,3 +257,39 @@ def test_equal_trains_push_in_step_at_equal_speeds() -> None:
     both = load(text.replace('speed = { of = "train.tram.motion.speed", values = [5, 10] }', speeds))
     first, other = (t for t in preview(kind_of(both).parts(both), 1).tables if "in step" in t.title)
     assert first.rows and first.rows == other.rows
+
+
+@pytest.mark.parametrize(
+    ("path", "meant"),
+    [
+        ("carriage.tram.motion.speed", "train.tram.motion.speed"),
+        ("carriage.tram_2.motion.speed", "train.tram.motion.speed"),
+        ("carriage.tram_2.headway", "train.tram.spacing"),
+    ],
+)
+def test_no_axle_is_swept_away_from_its_train(path: str, meant: str) -> None:
+    """Neither is it proposed to somebody who names the train a carriage."""
+    train = {"on": "bed", "kind": "force", "force": 2.0, "axles": 2, "spacing": 0.2, "motion": WAY}
+    swept = {"speed": {"of": path, "values": [0.5, 0.8]}}
+    with pytest.raises(BadInput) as caught:
+        expand(Study(kind="passage", body={"bed": beam()}, train={"tram": train}, sweep=swept))
+    assert meant in str(caught.value)
+
+
+@pytest.mark.parametrize(("start", "end"), [(0.0, 1.0), (1.0, 0.0)])
+def test_at_rest_axles_stand_behind_the_first(start: float, end: float) -> None:
+    """Readings of a train are those of its forces one by one, also of axles that are not on the bed yet."""
+    way, places = cruise(start, end, 0.8), [0.1, 0.35, 0.6, 0.95]
+    train = {"on": "bed", "kind": "force", "force": [2.0, 3.0], "axles": 2, "spacing": 0.3, "motion": way}
+    sensor = {"midspan": {"body": "bed", "at": 0.5}}
+    common: dict[str, Any] = {"kind": "influence", "body": {"bed": beam()}, "sensor": sensor}
+    found = studies.run(Study(train={"tram": train}, question={"positions": places}, **common))
+    behind = [place - 0.3 * np.sign(end - start) for place in places]
+    on = [place for place in behind if 0.0 <= place <= 1.0]
+    load = {"on": "bed", "kind": "force", "force": 1.0, "motion": way}
+    single = studies.run(Study(carriage={"car": load}, question={"positions": sorted({*places, *on})}, **common))
+    line = single["midspan"] if "midspan" in single else single["reading"].sel(sensor="midspan")
+    told = found["midspan"] if "midspan" in found else found["reading"].sel(sensor="midspan")
+    for row, (place, last) in enumerate(zip(places, behind, strict=True)):
+        expected = 2.0 * line.sel(position=place) + (3.0 * line.sel(position=last) if last in on else 0.0)
+        assert float(told[row]) == pytest.approx(float(expected), rel=1e-9)
