@@ -22,18 +22,31 @@ PATIENCE = 10.0  # the same of pieces that take longer than they say
 @one_thread()
 def sampled(pieces: Sequence[Piece], threads: int) -> Mapping[str, float]:
     """Seconds of all pieces by name: the shortest are computed as a run does, one after another, as long as there is
-    time; others take as much longer or shorter than they say as these."""
-    begun, took, said = time.perf_counter(), dict[str, float](), 0.0
+    time; others take as much longer or shorter than they say as these. The first is computed twice: what it loads
+    others find loaded."""
+    begun = time.perf_counter()
     work = Work(threads, AskedElsewhere(lambda: time.perf_counter() > begun + PATIENCE))
-    for piece in sorted(pieces, key=lambda piece: piece.seconds):
-        ratio, started = sum(took.values()) / said if said else 1.0, time.perf_counter()
-        if started + ratio * piece.seconds > begun + SECONDS:
+    by_length, took = sorted(pieces, key=lambda piece: piece.seconds), dict[str, float]()
+    loaded = _took(by_length[0], work) if by_length[0].seconds <= SECONDS else None
+    end, ratio = time.perf_counter() + SECONDS, 1.0
+    for piece in by_length if loaded is not None else []:
+        seconds = _took(piece, work) if time.perf_counter() + ratio * piece.seconds <= end else None
+        if seconds is None:
             break
-        try:
-            piece.compute(work)
-        except (Halted, Interrupted):
-            break
-        took[piece.name] = time.perf_counter() - started
-        said += piece.seconds
-    ratio = sum(took.values()) / said if said else 1.0
-    return {piece.name: took.get(piece.name, ratio * piece.seconds) for piece in pieces}
+        took[piece.name] = seconds
+        ratio = sum(took.values()) / sum(piece.seconds for piece in by_length[: len(took)])
+    found = {piece.name: took.get(piece.name, ratio * piece.seconds) for piece in pieces}
+    if loaded is not None:
+        first = by_length[0].name
+        found[first] = max(found[first], loaded)
+    return found
+
+
+def _took(piece: Piece, work: Work) -> float | None:
+    """Seconds of a piece; None where there was no time for it."""
+    started = time.perf_counter()
+    try:
+        piece.compute(work)
+    except (Halted, Interrupted):
+        return None
+    return time.perf_counter() - started
