@@ -48,3 +48,7 @@ def test_nothing_is_drawn_where_nothing_is_held() -> None:
     told = group()
     told["tolerance"][:] = NAN
     assert drawn(told) == []
+
+
+def test_a_single_variant_is_no_figure() -> None:
+    assert drawn(group().isel(sample=[0])) == []

@@ -9,8 +9,11 @@ import pytest
 import xarray as xr
 
 import studies
+from studies.findings.settled import settled
 from studies.pictures.common.figures import Figure
 from studies.reporting import answers
+from studies.results.formatting import percent
+from studies.results.results import Results
 from tests.pictures.test_passages import MASS, limits, panels
 from tests.studies import scenes
 
@@ -129,3 +132,50 @@ def test_contact_forces_that_a_swept_number_hardly_changes_are_curves() -> None:
     found = drawn(studies.run(f"{text}\n[sweep]\n{scenes.pace('passage', 1.0, 12.0)}\n{damping}"))["contact-table"]
     assert "Nearly the same for zeta 0.01 to 0.012." in found.caption
     assert found.drawing.axes[0].get_lines() and not found.drawing.axes[0].collections
+
+
+def test_grey_is_explained_where_something_has_left() -> None:
+    text = scenes.text_of("passage", scenes.pace("passage")).replace("speed = 8.0", "speed = 8.0\nafter = 1.0")
+    leaves, stays = drawn(studies.run(text))["response"], drawn(swayed())["response"]
+    assert "Grey: table has left" in leaves.caption and "rey" not in stays.caption
+
+
+def test_odd_parts_of_variants_that_have_not_settled_are_dashed_and_not_in_the_title() -> None:
+    damping = 'damping_ratio = { of = "body.bed.damping_ratio", values = [0.01, 0.05] }'
+    dataset = scenes.run("asymmetry", f"{scenes.pace('asymmetry', 0.2, 2.0, 6)}\n{damping}")
+    figure = drawn(dataset)["odd-and-even"]
+    odd = dataset.odd_rms.sel(sensor="midspan")
+    fine = settled(Results.of(dataset))
+    assert float(odd.where(fine).max()) < float(odd.max())
+    assert f"differ by up to {percent(float(odd.where(fine).max()))} of" in figure.title
+    assert "Dashed: variants that have not settled" in figure.caption
+
+
+def test_ways_that_are_one_line_are_a_sentence() -> None:
+    dataset = scenes.run("asymmetry", scenes.pace("asymmetry", 0.2, 2.0, 6)).copy(deep=True)
+    dataset.odd_rms.loc[{"sensor": "moment"}] = 1e-3
+    found = drawn(dataset)
+    assert "response-midspan" in found and "response-moment" not in found
+    assert "Not drawn, as their two ways would be one line: moment by 0.1 %" in found["response-midspan"].caption
+
+
+def shuttled() -> xr.Dataset:
+    """A shuttle at four rates with two masses, whose results may be changed."""
+    mass = 'mass = { of = "carriage.table.mass", values = [50, 100] }'
+    return scenes.run("double-peak", f"{scenes.pace('double-peak', 0.1, 0.4)}\n{mass}").copy(deep=True)
+
+
+def test_numbers_of_peaks_that_one_swept_number_does_not_change_are_steps_along_the_other() -> None:
+    dataset = shuttled()
+    dataset.peaks_per_cycle[:] = xr.where(dataset.mass > 60.0, 2, 1)
+    figure = drawn(dataset)["peaks-midspan"]
+    assert figure.title == "midspan has 1 peak per cycle up to 50 kg; beyond, 2"
+    assert "The same for pace 0.005 Hz to 0.02 Hz." in figure.caption and len(figure.drawing.axes) == 1
+
+
+def test_odd_harmonics_are_drawn_where_they_are_largest() -> None:
+    dataset = shuttled()
+    dataset.odd_even_ratio[:] = 0.5
+    dataset.odd_even_ratio.loc[{"mass": 50.0, "pace": dataset.pace[0], "sensor": "moment"}] = 3.25
+    figure = drawn(dataset)["odd-even"]
+    assert figure.title == "Odd harmonics of the bending moment under table are up to 3.25 times the even ones"

@@ -12,6 +12,7 @@ from results_schema.store import files
 from results_schema.store.archive import SCHEMA_VERSION, write_archive
 from studies.reporting import answers
 from studies.reporting.report import PAGE, write_report
+from studies.reporting.summary import Extreme, Range
 from tests.schema.samples import FailNth
 from tests.studies import scenes
 
@@ -111,6 +112,7 @@ def test_the_page_opens_with_six_figures_at_most_and_folds_methods(tmp_path: Pat
     unfolded = re.sub(r"<details.*?</details>", "", text, flags=re.DOTALL)
     assert unfolded.count("<figure id=") == min(6, sum(not figure.on_method for figure in found))
     assert text.count("<figure id=") == len(found) and any(figure.on_method for figure in found)
+    assert "by status" not in text and "without values" not in text  # all are fine, as the facts say
     assert "<h2>Answer</h2>" in unfolded and "How exact, and how it was computed" not in unfolded
     assert "<th>5 %</th><th>50 %</th>" in unfolded
     # a value and its error break between them alone, and stand beside the sensor that they are of
@@ -190,3 +192,11 @@ def test_a_full_disk_leaves_no_half_file(tmp_path: Path, monkeypatch: pytest.Mon
         write_report(source, tmp_path / "out")
     written = sorted(path.name for path in (tmp_path / "out").iterdir())
     assert len(written) == 2 and PAGE not in written
+
+
+def test_errors_beneath_the_digits_of_a_value_are_not_told() -> None:
+    def end(error: float) -> Extreme:
+        return Extreme(31.83, {}, {}, error)
+
+    found = Range("frequency", "", "Hz", end(3e-7), end(1e-2))
+    assert [found.said(one, 4) for one in (found.smallest, found.largest)] == ["31.83 Hz", "31.83 Hz ± 0.01 Hz"]
