@@ -244,7 +244,7 @@ def _breaks(results: Results, sensor: str) -> list[str]:
     counts, ratio = results.numbers("peaks_per_cycle", sensor), results.everywhere(theory.frequency_ratio(results))
     known = np.isfinite(counts)
     usual = pattern(results, sensor)
-    if np.unique(ratio[known]).size < 2 or not (counts[known] == usual).any():
+    if np.unique(ratio[known]).size < 2 or set(counts[known].tolist()) == {usual} or usual not in counts[known]:
         return []
     group = results.deciding_axis("peaks_per_cycle", sensor)
     if group is None:

@@ -48,7 +48,9 @@ PAGE = "report.html"
 TEMPLATES = Path(__file__).parent / "templates"
 LONG_TEXT = 120
 EVERYWHERE = "in every variant"
-UNIT = re.compile(r"(?<=\d) (?=(?:%|[nµmkMG]?(?:m|N|Pa|Hz|s|g|J|rad|t)\b))|(?<=\d [nµmkMG]N) (?=m\b)|(?<=\d N) (?=m\b)")
+UNIT = re.compile(  # the space between a number and its unit, and that within N m
+    r"(?<=\d) (?=(?:%|[nµmkMG]?(?:m|N|Pa|Hz|s|g|J|rad|t)(?![a-z])))|(?:(?<=\d [nµmkMG]N)|(?<=\d N)) (?=m(?![a-z]))"
+)
 SENTENCE = re.compile(r"(?<=\.) (?=[A-Z])")  # between two sentences
 MOST_OPEN = 6  # figures of the question that stand unfolded
 
