@@ -224,7 +224,7 @@ def test_chosen_maps_alone_are_computed() -> None:
     assert [figure.name for figure in KIND.figures(Results(dataset, asked))] == ["lagged-inertia", "overshoot"]
     facts = [row.name for row in report._facts(Results(dataset, asked), "point")]
     assert facts == ["kind of study"]  # one point has no table of statuses
-    assert report._statuses(Results(dataset, asked), "point") == []
+    assert report._statuses(Results(dataset, asked)) == []
 
 
 def test_closed_forms_of_pinned_beams_stay_away_from_other_bodies() -> None:

@@ -79,6 +79,7 @@ def test_both_models_agree(archive: Archive) -> None:
 
 def test_the_report_says_and_shows_it(archive: Archive, tmp_path: Path) -> None:
     page = write_report(archive.path, tmp_path / "report").read_text(encoding="utf-8")
+    page = page.replace("\N{NO-BREAK SPACE}", " ")
     said = unreduced.told_unreduced(archive.groups[unreduced.GROUP])
     assert "50 degrees of freedom, in 1 variant: every sensor within" in said[0] and "contact forces within" in said[0]
     assert all(sentence in page for sentence in said)
