@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -28,3 +29,13 @@ def told_of_compiling(tell: Callable[[str], object]) -> Iterator[None]:
 
     with event.install_listener("numba:compile", First()):
         yield
+
+
+@contextmanager
+def clock_without_compiling() -> Iterator[Callable[[], float]]:
+    """A clock, s, that stands still while kernels are compiled."""
+    from numba.core import event
+
+    compiling = event.TimingListener()
+    with event.install_listener("numba:compile", compiling):
+        yield lambda: time.perf_counter() - (compiling.duration if compiling.done else 0.0)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from engine.kernels.compiling import clock_without_compiling
 from engine.march.stepper import Halted
 from results_schema.status import Status, label
 from studies.moving.parts import AUDIT_SECONDS, again, pieces, scenes
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from results_schema.arrays import Array, Mask
     from studies.moving.parts import Scene
 
+Clock = Callable[[], float]
+
 PATIENCE = 10.0  # s of measuring, in which one piece is to be finished
 MEASURED = 3  # pieces, as many as half of that leaves room for
 UNFINISHED = 2.0  # times the seconds in which a piece was not done that it takes
@@ -37,15 +39,16 @@ def foreseen(
 
     everything, own = pieces(study, duration), scenes(study, expand(study))
     _compile(own[0])
-    begun = time.perf_counter()
-    found = _computed(everything, threads)
-    took = time.perf_counter() - begun
+    with clock_without_compiling() as clock:
+        begun = clock()
+        found = _computed(everything, threads, clock)
+        took = clock() - begun
+        each = _audit(study, duration, own[0], threads, clock) if found and audited else None
     known = [everything[number] for number in found] or everything[:1]
     share = sum(piece.seconds for piece in known) / sum(piece.seconds for piece in everything)
     seconds = (took if found else UNFINISHED * took) / share
     if audited:
         at_once = np.ceil(min(audited, len(own)) / threads)
-        each = _audit(study, duration, own[0], threads) if found else None
         seconds += at_once * each if each else AUDIT_SECONDS * audited * seconds / expand(study).size
     less = "" if found else f"{PATIENCE:.0f} seconds were not enough for a piece of it: this may take longer"
     title = f"What {counted(len(found), 'piece')} of {len(everything):,} took, as in a run"
@@ -66,12 +69,12 @@ def _compile(scene: Scene) -> None:
     march(level.model, values, np.full(1, 2.0 / level.steps), 2, np.array([0, 2]), weights(level.scheme))
 
 
-def _computed(everything: Sequence[Piece], threads: int) -> dict[int, xr.Dataset]:
+def _computed(everything: Sequence[Piece], threads: int, clock: Clock) -> dict[int, xr.Dataset]:
     """Some pieces by their numbers, as far as there is time."""
-    begun, found = time.perf_counter(), dict[int, "xr.Dataset"]()
-    work = Work(threads, AskedElsewhere(lambda: time.perf_counter() > begun + PATIENCE))
+    begun, found = clock(), dict[int, "xr.Dataset"]()
+    work = Work(threads, AskedElsewhere(lambda: clock() > begun + PATIENCE))
     for number in spread(len(everything), MEASURED):
-        if found and time.perf_counter() > begun + 0.5 * PATIENCE:
+        if found and clock() > begun + 0.5 * PATIENCE:
             break
         try:
             found[number] = everything[number].compute(work)
@@ -81,16 +84,16 @@ def _computed(everything: Sequence[Piece], threads: int) -> dict[int, xr.Dataset
 
 
 def _audit(
-    study: Study, duration: Callable[[Mapping[str, Array], int], Array], scene: Scene, threads: int
+    study: Study, duration: Callable[[Mapping[str, Array], int], Array], scene: Scene, threads: int, clock: Clock
 ) -> float | None:
     """Seconds of one audited variant; None where there is no time for it."""
-    begun = time.perf_counter()
-    work = Work(threads, AskedElsewhere(lambda: time.perf_counter() > begun + PATIENCE))
+    begun = clock()
+    work = Work(threads, AskedElsewhere(lambda: clock() > begun + PATIENCE))
     try:
         again(study, duration, scene.variants[:1], work)
     except Halted:
         return None
-    return time.perf_counter() - begun
+    return clock() - begun
 
 
 def _held(study: Study) -> Mask:
