@@ -121,9 +121,11 @@ def _standing(model: SceneModel, name: str, places: Array) -> Array:
     """(S,) where a carriage stands while the first is at `places`: axles keep their distances."""
     trains, first, carriage = model.study.axles, model.carriages[0].name, model.study.carriage[name]
     start, end = (float(carriage.motion.path(tau).S) for tau in (0.0, carriage.motion.duration))
-    ahead = places if name == first or (name in trains and trains[name] == trains.get(first)) else start
     behind = np.sign(end - start) * (carriage.headway or 0.0) if name in trains else 0.0
-    return np.asarray(np.full_like(places, ahead) - behind)
+    if name == first or (name in trains and trains[name] == trains.get(first)):
+        behind += float(model.study.carriage[first].motion.path(0.0).S) - start
+        return np.asarray(places - behind)
+    return np.full_like(places, start - behind)
 
 
 def _way(rider: Rider, segment: Segment, tau: Array, active: bool, highest: int) -> StationPath:

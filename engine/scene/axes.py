@@ -128,7 +128,7 @@ def check_targets(study: Study, name: str, axis: SweepAxis) -> None:
             raise study.source.fault(
                 here,
                 "this number of a train cannot be swept",
-                expected="spacing (one for all), spacing_scale, load_scale, a load or a number of the motion",
+                expected=study.train[path.split(".")[1]].swept,
                 received=shortened(path),
                 remedy="a study file for each",
             )

@@ -26,9 +26,10 @@ OneOrEach = Annotated[
 ]
 
 
-def _cruising(motion: Motion) -> Motion:
-    if not (motion.passes and motion.pace == "speed"):
-        raise fault("the axles of a train keep their distances", expected='kind = "cruise"', received=motion.kind)
+def _in_a_row(motion: Motion) -> Motion:
+    if not (motion.ends or (motion.passes and motion.pace == "speed")):
+        expected = 'kind = "cruise", "point-to-point" or "out-and-back"'
+        raise fault("the axles of a train keep their distances", expected=expected, received=motion.kind)
     return motion
 
 
@@ -47,7 +48,7 @@ class Train(Spec):
 
     kind: str
     on: Annotated[str, Noun("the name of a body")]
-    motion: Annotated[AnyMotion, AfterValidator(_cruising)]
+    motion: Annotated[AnyMotion, AfterValidator(_in_a_row)]
     axles: int | None = Field(default=None, ge=1, le=MAX_AXLES)
     spacing: OneOrEach[Annotated[Length, Field(gt=0)]]
     spacing_scale: Dimensionless = Field(default=1.0, gt=0)
@@ -89,6 +90,13 @@ class Train(Spec):
         return np.asarray(np.abs(turned) / loads.sum())
 
     @property
+    def swept(self) -> str:
+        """What of it may be swept, in words."""
+        if self.motion.ends:
+            return "load_scale, a load or a number of the motion, but not where that begins and ends"
+        return "spacing (one for all), spacing_scale, load_scale, a load or a number of the motion"
+
+    @property
     def each(self) -> tuple[str, ...]:
         """Keys of all that an axle has of its own besides its place."""
         return (*self.loads, *self.springs)
@@ -105,12 +113,24 @@ class Train(Spec):
     def numbers(self, axle: int) -> dict[str, float]:
         """What an axle has of its own, counted from 0, by the keys of carriages."""
         found = {key: self.own(key)[axle] * self.scale(key) for key in self.each}
-        return found | ({"headway": self.distances[axle] * self.spacing_scale} if axle else {})
+        trails = axle and not self.motion.ends
+        return found | ({"headway": self.distances[axle] * self.spacing_scale} if trails else {})
+
+    def ends(self, axle: int) -> dict[str, float]:
+        """m where the way of an axle begins and ends, by the keys of its motion, where it is on the body all the
+        time: as far behind the first as it stands."""
+        if not self.motion.ends:
+            return {}
+        start, end = (float(getattr(self.motion, key)) for key in self.motion.ends)
+        behind = float(np.sign(end - start)) * self.distances[axle] * self.spacing_scale
+        return dict(zip(self.motion.ends, (start - behind, end - behind), strict=True))
 
     def follow(self, key: str) -> Iterator[tuple[int, str, float]]:
         """What follows a number of the train in proportion: axle from 0, its key and the factor."""
         first, _, rest = key.partition(".")
         trailing, axles = range(1, self.count), range(self.count)
+        if self.motion.ends and (first.startswith("spacing") or (first == "motion" and rest in self.motion.ends)):
+            return  # their places would not grow in proportion
         if key == "spacing" and not isinstance(self.spacing, tuple):
             yield from ((axle, "headway", axle * self.spacing_scale) for axle in trailing)
         elif key == "spacing_scale":
@@ -135,6 +155,12 @@ class Train(Spec):
             if len(self.own(key)) != self.count:
                 what, received = f"{key} is one number, or one for each axle", f"{len(self.own(key))} numbers"
                 raise fault(what, expected=f"{self.count} numbers, or one", received=received)
+        last = min(self.ends(self.count - 1).values(), default=0.0)
+        if last < 0.0:
+            what = "the last axle is off the body at an end of its way, where only a cruise comes onto it"
+            raise fault(
+                what, expected=f"places {-last:.4g} m further on", received=f"{last:.4g} m, {self.length:.4g} behind"
+            )
         return self
 
 
@@ -208,10 +234,11 @@ def with_axles(document: Document) -> Document:
     axles, trained_by = {}, {}
     for name, train in trains.items():
         shared = {key: value for key, value in data["train"][name].items() if key not in Train.model_fields}
-        shared |= {key: data["train"][name][key] for key in ("kind", "on", "motion")}
+        shared |= {key: data["train"][name][key] for key in ("kind", "on")}
         for axle in range(train.count):
             own = axle_name(name, axle)
-            axles[own] = shared | train.numbers(axle)
+            motion = {"motion": data["train"][name]["motion"] | train.ends(axle)}
+            axles[own] = shared | train.numbers(axle) | motion
             trained_by[f"carriage.{own}"] = f"train.{name}"
     for name in axles:
         if "kind" in written.get(name, {}):

@@ -1,6 +1,7 @@
 """Levels of more and more modes and steps: what they converge to, and what is told of what they miss."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -200,6 +201,22 @@ def test_a_train_is_told_about_what_it_is_off_by() -> None:
     numbers = [number for number, result in enumerate(results_of(grid.asked)) if result.name.endswith("_rms")]
     ratios = found.error[numbers, 0] / off[numbers, 0]
     assert ratios.size == 3 and ratios.min() >= 1.0 and ratios.max() <= 10.0, ratios
+
+
+def test_extremes_are_not_told_by_the_few_places_at_which_forces_jump() -> None:
+    """A sensor's history and a contact force, each another at one place where neither is largest."""
+    grid = only_grid(passages(car=mass(0.2, cruise(0.0, 1.0, 0.9, after=2.0)), output={"histories": "all"}))
+    model = grid.model(in_full(grid).numerics[0])
+    stations = grid.stations(model, 4)
+    one = outcome(grid.asked, grid.once(model, 4), grid.values, stations)
+    jumped = replace(one, history=one.history.copy())
+    jumped.history[len(stations) // 3] += 0.5 * one.scale[:, :1].T
+    names = [result.name for result in results_of(grid.asked)]
+    off = dict(zip(names, differences(grid.asked, model, grid.values, one, jumped)[:, 0], strict=True))
+    assert off["midspan"] == pytest.approx(0.5) and off["midspan_max"] == 0.0 == off["car_contact_force_min"]
+    jumped.history[:] += 0.5 * one.scale[:, :1].T
+    off = dict(zip(names, differences(grid.asked, model, grid.values, one, jumped)[:, 0], strict=True))
+    assert off["midspan_max"] == pytest.approx(0.25) and off["car_contact_force_min"] > 0.0
 
 
 @pytest.mark.parametrize("falls, stays", [(1, STAYS_UNCORRECTED), (3, STAYS)])

@@ -25,6 +25,12 @@ MISTAKES = {
         OTHER.replace("= 1e-6", "= 1e6"), 2, ["body.beam.second_moment", "no beam has this", '"1e+06 mm^4"'],
     ),
     "modulus without GPa": (OTHER.replace("= 1e9", "= 210"), 0, ["youngs_modulus = 210 Pa", '"210 GPa"']),
+    "MPa in place of GPa": (
+        SMALL.replace("= 1e9", "= 2.1e8").replace("= 1000.0", "= 7850"), 0, ["youngs_modulus = 2.1e+08 Pa", "denser"],
+    ),
+    "fibres in mm": (
+        SMALL.replace("area =", "fibre_distance = 220\narea ="), 0, ["fibre_distance = 220 m", '"220 mm"'],
+    ),
     "density in g/cm3": (SMALL.replace("= 1000.0", "= 7.85"), 0, ["density = 7.85", '"7.85 g/cm^3"']),
     "length in mm": (SMALL.replace("length = 1.0", "length = 15000"), 0, ["length = 15000 m", '"15000 mm"']),
     "a way in mm": (SMALL.replace("end = 1.0", "end = 1000"), 0, ["goes from 0 to 1000 m", "units"]),

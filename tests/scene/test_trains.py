@@ -94,6 +94,27 @@ def test_forces_with_speed_and_force_swept() -> None:
     same(train(force(2.0, WAY) | REGULAR, **short), axles([force(2.0, WAY)] * 3, [0.0, 0.3, 0.6], **written))
 
 
+STOPPING = {"kind": "point-to-point", "speed": 0.8, "acceleration": 2.0, "dwell": 0.2}
+TURNING = {"kind": "out-and-back", "speed": 0.8, "turn": 0.2, "cycles": 2}
+
+
+@pytest.mark.parametrize("motion", [STOPPING, TURNING], ids=["point-to-point", "out-and-back"])
+@pytest.mark.parametrize(("start", "end"), [(0.4, 0.9), (0.6, 0.1)])
+def test_axles_that_stay_on_the_bed_start_and_stop_as_far_behind(
+    motion: dict[str, Any], start: float, end: float
+) -> None:
+    way = {key: value for key, value in motion.items() if key != "kind"}
+    keys, behind = [f"carriage.tram_{n}" for n in (1, 2)], 0.3 * np.sign(end - start)
+    both = [
+        mass(0.2, {"kind": motion["kind"], "start": s, "end": e, **way})
+        for s, e in ((start, end), (start - behind, end - behind))
+    ]
+    written = swept(speed={"of": [f"{key}.motion.speed" for key in keys], "values": SPEED})
+    short = swept(speed={"of": "train.tram.motion.speed", "values": SPEED})
+    alone = study(beam(), dict(zip(("tram_1", "tram_2"), both, strict=True)), **written)
+    same(train(both[0] | {"axles": 2, "spacing": 0.3}, **short), alone)
+
+
 @pytest.mark.parametrize("spacing", [0.1, 0.3, 0.7])
 def test_swept_spacings_are_those_of_carriages(spacing: float) -> None:
     """Of masses, one value after another, as separate carriages have no key for it."""
@@ -159,6 +180,18 @@ def test_one_variant_as_a_study_of_its_own() -> None:
             'kind = "cruise"\nstart = 0\nend = 15\nspeed = 10',
             'kind = "sinusoidal"\ncentre = 7\namplitude = 1\nfrequency = 1\ncycles = 1',
             ["train.tram.motion", "distances", "cruise"],
+        ),
+        (
+            'kind = "cruise"\nstart = 0\nend = 15\nspeed = 10',
+            'kind = "point-to-point"\nstart = 3\nend = 15\nspeed = 10\nacceleration = 1',
+            ["train.tram:", "last axle", "1 m further on"],
+        ),
+        (
+            'kind = "cruise"\nstart = 0\nend = 15\nspeed = 10\n\n[sensor.midspan]\nbody = "bed"\nat = 7.5\n\n'
+            '[sweep]\nspeed = { of = "train.tram.motion.speed"',
+            'kind = "out-and-back"\nstart = 4\nend = 15\nspeed = 10\nturn = 0.1\ncycles = 1\n\n[sensor.midspan]\n'
+            'body = "bed"\nat = 7.5\n\n[sweep]\nspeed = { of = "train.tram.spacing"',
+            ["sweep.speed.of", "cannot be swept", "not where that begins"],
         ),
         ("train.tram.motion.speed", "train.tram.axles", ["sweep.speed.of", "cannot be swept", "spacing_scale"]),
         ("train.tram.motion.speed", "train.tram.spacin", ["sweep.speed.of", '"train.tram.spacing"']),
@@ -276,10 +309,10 @@ def test_no_axle_is_swept_away_from_its_train(path: str, meant: str) -> None:
     assert meant in str(caught.value)
 
 
-@pytest.mark.parametrize(("start", "end"), [(0.0, 1.0), (1.0, 0.0)])
-def test_at_rest_axles_stand_behind_the_first(start: float, end: float) -> None:
+@pytest.mark.parametrize("way", [cruise(0.0, 1.0, 0.8), cruise(1.0, 0.0, 0.8), STOPPING | {"start": 0.4, "end": 0.9}])
+def test_at_rest_axles_stand_behind_the_first(way: dict[str, Any]) -> None:
     """Readings of a train are those of its forces one by one, also of axles that are not on the bed yet."""
-    way, places = cruise(start, end, 0.8), [0.1, 0.35, 0.6, 0.95]
+    start, end, places = way["start"], way["end"], [0.1, 0.35, 0.6, 0.95]
     train = {"on": "bed", "kind": "force", "force": [2.0, 3.0], "axles": 2, "spacing": 0.3, "motion": way}
     sensor = {"midspan": {"body": "bed", "at": 0.5}}
     common: dict[str, Any] = {"kind": "influence", "body": {"bed": beam()}, "sensor": sensor}

@@ -321,4 +321,8 @@ class Frame(Body):
         return found
 
     def doubts(self, here: str) -> list[Doubt]:
-        return [doubt for name in self.section for doubt in section_doubts(f"{here}.section.{name}", f"{here}.length")]
+        keys, found = ("fibre_distance", "fibre_distance_lateral"), list[Doubt]()
+        for name, section in self.section.items():
+            fibres = [key for key in keys if getattr(section, key) is not None]
+            found += section_doubts(f"{here}.section.{name}", f"{here}.length", *fibres)
+        return found

@@ -34,8 +34,9 @@ class Doubt(Check):
         return f"did you mean {' or '.join(likely)}?" if likely else ""
 
 
-def section_doubts(here: str, length: str) -> list[Doubt]:
-    """Of a uniform section with its material at the dotted key `here`, of a body whose length has the key `length`.
+def section_doubts(here: str, length: str, *fibres: str) -> list[Doubt]:
+    """Of a uniform section with its material at the dotted key `here`, of a body whose length has the key `length`, and
+    of those of its keys that tell how far its extreme fibres lie out.
 
     A study in which neither the modulus nor the density is that of a material has units of its own, and no doubts.
     """
@@ -52,12 +53,15 @@ def section_doubts(here: str, length: str) -> list[Doubt]:
     area, inertia = f"{here}.area", f"{here}.second_moment"
     return [
         doubt(Pressure, "GPa MPa", material[:1], "1e5 to 2e12 Pa, steel 2.1e11", _modulus_of_matter),
+        doubt(Pressure, "", material, "above 5e8 Pa for what is denser than 2000 kg/m3", _stiff_where_heavy),
         doubt(Density, "g/cm^3 t/mm^3", material[1:], "20 to 50000 kg/m3, steel 7850", _density_of_matter),
         doubt(Length, "mm cm", (length,), "1e-4 to 1e4 m", lambda size: (size >= 1e-4) & (size <= 1e4)),
         doubt(Area, "mm^2 cm^2", (area, length), "at most length^2/4, in m2",
               lambda size, along: size <= along**2 / 4),
         doubt(SecondMoment, "mm^4 cm^4", (inertia, area, length), "at most area x length^2/16, in m4",
               lambda size, across, along: size <= across * along**2 / 16),
+        *(doubt(Length, "mm cm", (f"{here}.{fibre}", length), "at most half the length of its body, in m",
+                lambda size, along: size <= along / 2) for fibre in fibres),
     ]  # fmt: skip
 
 
@@ -71,6 +75,11 @@ def damping_doubt(here: str) -> Doubt:
 def _modulus_of_matter(modulus: Any) -> Any:
     """From rubber to diamond, Pa."""
     return (modulus >= 1e5) & (modulus <= 2e12)
+
+
+def _stiff_where_heavy(modulus: Any, density: Any) -> Any:
+    """Of metals, stone and concrete lead has the least modulus, 1.6e10 Pa; rubber and foam are lighter."""
+    return (modulus >= 5e8) | (density <= 2000)
 
 
 def _density_of_matter(density: Any) -> Any:

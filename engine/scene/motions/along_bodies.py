@@ -81,6 +81,7 @@ class OutAndBack(Motion):
 
     pace = "speed"
     period = 1.0
+    ends = ("start", "end")
     in_pieces = True
     kind: Literal["out-and-back"]
     start: Length

@@ -61,6 +61,7 @@ class Motion(SpecOfKind):
     passes: ClassVar[bool] = False  # whether the carriage is on the body while it moves only
     slides: ClassVar[bool] = False  # whether its place is an unknown of the equations of motion
     is_harmonic: ClassVar[bool] = False  # whether it swings as a sine about the middle of its range
+    ends: ClassVar[tuple[str, ...]] = ()  # keys of where its way begins and ends, where it is on the body all the time
     in_pieces: ClassVar[bool] = False  # whether bodies in frames that move know it, by `pieces`
 
     @property

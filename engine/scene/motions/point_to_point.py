@@ -104,6 +104,7 @@ class PointToPoint(Motion):
     (3.0, [1.0, 2.25, 3.0])
     """
 
+    ends = ("start", "end")
     in_pieces = True
     kind: Literal["point-to-point"]
     start: Length
