@@ -10,7 +10,7 @@ import numpy as np
 
 from engine.kernels.schemes import SCHEMES
 from engine.march.envelopes import envelope_tables
-from engine.march.step_rules import LIMIT_MARGIN, free_steps, least_steps, vibrates_freely
+from engine.march.step_rules import LIMIT_MARGIN, are_soft, free_steps, least_steps, vibrates_freely
 from engine.march.tables import SceneTables
 from engine.model.numerics import open_bodies
 from engine.model.scene_model import with_numerics
@@ -184,9 +184,13 @@ def unit_steps(scene: SceneModel) -> int:
     return PASSAGE_STEPS if scene.clock.period is None else CYCLE_STEPS
 
 
-def swift_scheme_fits(scene: SceneModel) -> bool:
-    """Whether Fox-Goodwin may march a scene: free vibration with springs wants a scheme without a limit."""
-    return not (scene.springs and any(vibrates_freely(carriage) for carriage in scene.carriages))
+def swift_scheme_fits(grid: SceneGrid) -> bool:
+    """Whether Fox-Goodwin may march a scene: free vibration with springs that are not soft beside any of its modes
+    wants a scheme without a limit."""
+    if not any(vibrates_freely(carriage) for carriage in grid.scene.carriages):
+        return True
+    fewest = grid.mode_levels[0] if open_bodies(grid.asked.study) else 0
+    return are_soft(grid.model(grid.scene.numerics._replace(modes=fewest)), grid.values)
 
 
 AVERAGE_ACCELERATION, FOX_GOODWIN = (SCHEMES[name]({}) for name in ("average-acceleration", "fox-goodwin"))

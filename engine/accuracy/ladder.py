@@ -85,7 +85,7 @@ def ladder_of(asked: Asked, grid: SceneGrid) -> Ladder:
     modes = [count for count in MODES if count > rigid] if names else [0]
     schemes = [own.scheme]
     if study.solver.scheme == "auto" and not grid.fixed:
-        schemes = [AVERAGE_ACCELERATION, FOX_GOODWIN] if swift_scheme_fits(grid.scene) else [AVERAGE_ACCELERATION]
+        schemes = [AVERAGE_ACCELERATION, FOX_GOODWIN] if swift_scheme_fits(grid) else [AVERAGE_ACCELERATION]
     columns = [
         own._replace(fidelity=name, scheme=scheme, modes=count)
         for name in _models(asked, grid)

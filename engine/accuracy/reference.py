@@ -102,7 +102,7 @@ def as_fixed(grid: SceneGrid) -> Levels:
 def _scheme(grid: SceneGrid) -> Scheme:
     """Fox-Goodwin where the modes grow with the levels; the limit of the highest of modes that a study fixes, most of
     which hardly move, would ask for far more steps than average acceleration needs."""
-    fits = bool(open_bodies(grid.scene.study)) and swift_scheme_fits(grid.scene)
+    fits = bool(open_bodies(grid.scene.study)) and swift_scheme_fits(grid)
     return FOX_GOODWIN if fits else AVERAGE_ACCELERATION
 
 

@@ -280,8 +280,7 @@ def _grids(
     if scene.fidelity is Fidelity.STATIC or not values.has_fixed_steps:
         if scene.fidelity is not Fidelity.STATIC:
             check_slowest(scene, values)
-            if scene.springs:
-                check_free_vibration(scene)
+            check_free_vibration(scene, values)
         yield SceneGrid(asked, scene, values, unit_steps(scene)), variants
         return
     steps = values.steps

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from engine.scene.variants import VariantValues
 
 
+SOFT = 0.25  # of the highest frequency of the bodies' modes: springs raise it by 3 % at most, within LIMIT_MARGIN
 FREE_STEPS = 200  # per first period of free vibration where the study fixes the steps: 8e-5 of phase a period
 LIMIT_MARGIN = 1.05  # a conditionally stable scheme stays this far inside its limit, which a mass on it lowers a little
 # Steps must be so many times the alias rule's. Right above the rule average acceleration still grows by up to 1.23 per
@@ -213,7 +214,7 @@ def check_steps(model: SceneModel, values: VariantValues, steps: Counts) -> None
         _check_alias(model, time_scale, steps)
     if not model.springs:
         return
-    check_free_vibration(model)
+    check_free_vibration(model, values)
     if math.isfinite(model.scheme.stability_limit):
         _refuse(model, limit_with_springs(model, values), steps, "the step is beyond the scheme's stability limit")
     least = model.scheme.stride * time_scale * contact_omega(model, values) / (2.0 * math.pi)
@@ -225,12 +226,19 @@ def vibrates_freely(carriage: CarriageTie) -> bool:
     return carriage.rider.motion.free_vibration > 0.0
 
 
-def check_free_vibration(model: SceneModel) -> None:
-    """Refuse free vibration with springs by a conditionally stable scheme: its steps follow from the bodies' modes
-    alone, whatever the springs of a variant. Raises BadInput."""
+def are_soft(model: SceneModel, values: VariantValues) -> bool:
+    """Whether springs are so soft in all variants that the steps of free vibration, which follow from the bodies' modes
+    alone, are within a scheme's limit."""
+    return not model.springs or float(contact_omega(model, values).max()) <= SOFT * float(model.omega.max())
+
+
+def check_free_vibration(model: SceneModel, values: VariantValues) -> None:
+    """Refuse free vibration with springs that are not soft by a conditionally stable scheme. Raises BadInput."""
+    if not math.isfinite(model.scheme.stability_limit) or are_soft(model, values):
+        return
     for carriage in model.carriages:
-        if math.isfinite(model.scheme.stability_limit) and vibrates_freely(carriage):
-            what = "free vibration with springs needs a scheme that is stable with any step"
+        if vibrates_freely(carriage):
+            what = "free vibration with springs as stiff needs a scheme that is stable with any step"
             remedy = 'scheme = "average-acceleration"'
             raise model.study.source.fault(f"carriage.{carriage.name}.motion.after", what, expected="0", remedy=remedy)
 

@@ -45,8 +45,11 @@ def speeds_in_step(
 ) -> list[InStep]:
     """Where much of a train's load pushes in step with one of the first frequencies of its body, the highest speed
     first: at most eight, at which that mode swings most. body: as its archive tells it. readers: where some read
-    accelerations of that body these count, of modes up to their frequency limits, else displacements."""
+    accelerations of that body these count, of modes up to their frequency limits, else displacements. None of a train
+    that starts and stops, whose axles never come in one rhythm for long."""
     train, found, speeds = study.train[name], list[InStep](), np.geomspace(*between, LOOKED_AT)
+    if not train.motion.passes:
+        return []
     of_body = [one for one in readers if one.body == train.on]
     read = [one for one in of_body if QUANTITIES[one.quantity].rate == ACCELERATION]
     units, newtons = "m s-2" if read else "m", train.load * (1.0 if train.units == "N" else study.gravity)

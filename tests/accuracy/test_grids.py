@@ -105,8 +105,12 @@ FIXED: dict[str, tuple[Table, dict[str, set[Any]]]] = {
         {"car": oscillator(0.2, 30.0, cruise(0.0, 1.0, 0.9))},
         {"fidelity": {"static", "force", "mass", "auto"}},
     ),
-    "springs and free vibration": (
+    "soft springs and free vibration": (
         {"car": oscillator(0.2, 30.0, cruise(0.0, 1.0, 0.9, after=1.0))},
+        {"scheme": {"average-acceleration", "fox-goodwin"}},
+    ),
+    "stiff springs and free vibration": (
+        {"car": oscillator(0.2, 3e4, cruise(0.0, 1.0, 0.9, after=1.0))},
         {"scheme": {"average-acceleration"}},
     ),
     "a velocity": ({"sensor": {"fast": fixed(0.4, "velocity")}}, {"modes": {2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64}}),
