@@ -249,7 +249,7 @@ def poisoned(plan: Plan, variants: Counts, halted: Halted, group: int, beside: i
 def test_a_variant_that_ends_every_process_is_found(workers: Workers, monkeypatch: pytest.MonkeyPatch) -> None:
     on_threads()  # of this process, which is not to end
     monkeypatch.setattr(chunk_of_plan, "march_chunk", poisoned)
-    found = marched(workers, 2)
+    found = marched(workers, 4)
     assert_same_bits(found, (POISON,))
     assert np.flatnonzero(found.arrays["status"] == Status.CRASHED).tolist() == [POISON]
     numbers = [array[POISON] for array in found.arrays.values() if array.dtype.kind == "f"]

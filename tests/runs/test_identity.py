@@ -303,8 +303,10 @@ def test_the_key_covers_every_source_that_a_run_loads(here: Path) -> None:
     kinds = "double-peak", "influence", "stability"
     for kind in kinds:
         imported.write(here, bed, kind, **({"carriage": car} if kind == "double-peak" else {}))
-        Path("bed.toml").rename(kind)
-    done = subprocess.run([sys.executable, "-c", LOADED, *kinds], capture_output=True, text=True, check=True)
+        Path("bed.toml").rename(f"{kind}.toml")
+    done = subprocess.run(
+        [sys.executable, "-c", LOADED, *(f"{kind}.toml" for kind in kinds)], capture_output=True, text=True, check=True
+    )
     loaded = {Path(name) for name in json.loads(done.stdout.splitlines()[-1])}
     ours = {path for path in loaded if path.is_relative_to(PROGRAM) and path.suffix == ".py"}
     ours = {path for path in ours if path.relative_to(PROGRAM).parts[0] in identity.PACKAGES}
