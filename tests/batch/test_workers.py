@@ -105,13 +105,13 @@ NAPS = [Job(nap, np.array([number])) for number in range(40)]
 
 @pytest.mark.fault(31)
 def test_what_a_killed_worker_had_is_done_again(workers: Workers) -> None:
-    """Of two, one dies every other second while jobs of 12 s are done, and once others have done some since, as workers
+    """Of two, one dies twice, after 2 s, while jobs of 12 s are done, and once others have done some since, as workers
     may take longer to start; what is found later has the same bits."""
     ended, killed, had = threading.Event(), list[int](), 0
 
     def kill() -> None:
         nonlocal had
-        while not ended.wait(2.0):
+        while len(killed) < 2 and not ended.wait(2.0):
             if len(found) == had:
                 continue
             had = len(found)

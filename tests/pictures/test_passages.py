@@ -126,6 +126,10 @@ motion = { kind = "cruise", start = 0.0, end = 10.0, speed = "30 km/h" }
 [sensor.quarter]
 body = "bed"
 at = 2.5
+
+[solver]
+steps = 400
+audit = 0
 """
 SPEED = 'speed = { of = "train.tram.motion.speed", from = "6 km/h", to = "144 km/h", count = 5 }'
 

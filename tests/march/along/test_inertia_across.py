@@ -203,7 +203,7 @@ def test_errors_are_told_of_the_sway_across_too() -> None:
     found = engine.run(study(READ, bed, solver={"tolerance": 0.02}, **others))
     assert (found.status == Status.OK).all() and (found.error_estimate < 0.02).all()
     assert set(found.fidelity_used.values.tolist()) == {3}
-    fine = engine.run(study(READ, bed | {"modes": 64}, solver={"steps": 50_000}, **others))
+    fine = engine.run(study(READ, bed | {"modes": 40}, solver={"steps": 20_000}, **others))
     coarse = engine.run(study(READ, bed | {"modes": 4}, solver={"steps": 400}, **others))
     scale = np.abs(fine.sway_max.values)
     for run in (found, coarse):

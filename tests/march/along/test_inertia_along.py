@@ -223,7 +223,7 @@ def test_errors_are_told_of_the_sway_too() -> None:
     assert (found.status == Status.OK).all() and (found.error_estimate < 1e-3).all()
     assert set(found.fidelity_used.values.tolist()) == {3}
     others = {"carriage": pushing(BRAKES), "sweep": axis}
-    fine = engine.run(study(sensors, PORTAL | {"modes": 28}, solver={"steps": 60_000}, **others))
+    fine = engine.run(study(sensors, PORTAL | {"modes": 28}, solver={"steps": 20_000}, **others))
     coarse = engine.run(study(sensors, PORTAL | {"modes": 3}, solver={"steps": 120}, **others))
     scale = np.abs(fine.sway_max.values)
     for run in (found, coarse):
