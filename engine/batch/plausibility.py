@@ -203,6 +203,23 @@ def _thin(plan: Plan) -> Iterator[str]:
                 yield f"{steps} steps are only {steps / periods:.2g} in a first period of the body"
 
 
+def _brief_rest(plan: Plan) -> Iterator[str]:
+    """Of the variant that has the least time to ring on, where it is told how far that goes."""
+    if not plan.study.output.residual:
+        return
+    periods = []
+    for grid in plan.grids:
+        riders, period = grid.scene.riders, 2.0 * np.pi / grid.scene.first_omega
+        rest = max(rider.end for rider in riders) - max(rider.rests_from for rider in riders)
+        free = max(rider.motion.free_vibration for rider in riders)
+        periods.append(rest * float(_time_scale(grid).min()) / period + free)
+    if 0.0 < min(periods) < 1.0:
+        yield (
+            f"after the last carriage has come to rest the run lasts {min(periods):.2g} first periods of the body, so "
+            "that residual vibration may swing further than is told: a longer dwell (or after) shows it all"
+        )
+
+
 def _time_scale(grid: SceneGrid) -> Array:
     """(V,) s per unit of scene time."""
     return grid.values.scene_time_scale
@@ -221,4 +238,5 @@ REMARKS = (
     _light,
     _deep,
     _thin,
+    _brief_rest,
 )

@@ -293,6 +293,9 @@ CASES = {
     "no structure bends so far": passing(car=mass(1.9, WAY), bed=beam(youngs_modulus=0.0005)),
     "small-deflection": passing(car=mass(1.9, WAY), bed=beam(youngs_modulus=0.01)),
     "in a first period": passing(beam(modes=1), solver={"steps": 30}),
+    "lasts 0.25 first periods of the body, so that residual": passing(
+        beam(modes=1), mass(0.1, cruise(0.0, 1.0, 0.5, after=0.25)), output={"residual": True}
+    ),
     "does not act along or across its track: if it did (carriage.car.inertia_along = true": on_portal(),
 }
 
@@ -304,6 +307,7 @@ def test_remarked(words: str) -> None:
 
 def test_an_ordinary_study_is_not_remarked() -> None:
     assert remarks(make_plan(passing())) == []
+    assert remarks(make_plan(passing(car=mass(0.1, WAY | {"after": 1.0}), output={"residual": True}))) == []
     quick = passing(beam(youngs_modulus=1e8), car=mass(0.1, cruise(0.0, 1.0, 145.0)))
     assert not any("at speeds up to" in remark for remark in remarks(make_plan(quick)))
     assert remarks(make_plan(on_portal(inertia_along=True, inertia_across=True))) == []
