@@ -89,7 +89,9 @@ def _automatic(found: Sequence[Automatic], tolerance: float) -> str:
     if not costs:
         return f"{who} cannot be compared with the front, where no point surely errs so little. {erring}"
     worst, scene = max(costs)
-    where = f"in all {len(found)} scenes" if len(found) > 1 else "in the one scene"
+    if len(found) == 1:
+        return f"{who} costs {number(worst, 2)} times the front at the error asked. {erring}"
+    where = f"in all {len(found)} scenes"
     if len(costs) < len(found):
         where = f"in {len(costs)} of {len(found)} scenes; in the others no point surely errs so little"
     return f"{who} costs at most {number(worst, 2)} times the front at the error asked ({scene}), {where}. {erring}"

@@ -243,6 +243,8 @@ def _extreme(results: Results, array: xr.DataArray, flat: np.intp, errors: Array
         swept = len(coordinate.dims) == 1 and coordinate.dims[0] in place and coordinate.dtype.kind in "ifU"
         if swept and name not in _DERIVED:
             variant[str(name)] = value = coordinate.variable[place[coordinate.dims[0]]].values.item()
+            if coordinate.size == 1 and name not in swept_axes:
+                continue  # the one scene of a study of schemes, say
             if isinstance(value, str):
                 words[str(name)] = value
             elif name in swept_axes:
