@@ -257,16 +257,23 @@ def _status(model: SceneModel, marched: Marched) -> tuple[NDArray[np.int8], NDAr
 
 
 def _statics(tables: SceneTables, values: VariantValues) -> Flat:
-    """The largest absolute static reading of every sensor while the carriages go their way, by the same model."""
+    """The largest absolute static reading of every sensor while the carriages go their way, by the same model; 0 where
+    that is rounding."""
     unit = tables.statics.over_window
-    loads, gravity = weights(tables.model, values), values.gravity
+    loads, gravity, least = weights(tables.model, values), values.gravity, _least_static(tables, values)
     found: Flat = {}
     for j, sensor in enumerate(tables.sensors[: len(tables.model.study.sensor)]):
         if loads.shape[0] == 1 and not np.any(unit.gravity[:, j]):
-            found[f"{sensor.name}_static"] = np.abs(unit.force[:, j, 0]).max() * np.abs(loads[0])
+            static = np.abs(unit.force[:, j, 0]).max() * np.abs(loads[0])
         else:
-            found[f"{sensor.name}_static"] = _largest_static(unit.force[:, j], unit.gravity[:, j], loads, gravity)
+            static = _largest_static(unit.force[:, j], unit.gravity[:, j], loads, gravity)
+        found[f"{sensor.name}_static"] = np.where(static > least[:, j], static, 0.0)
     return found
+
+
+def _least_static(tables: SceneTables, values: VariantValues) -> Array:
+    """(V, sensors) the least static reading that is more than rounding; of a rate in its unit."""
+    return np.outer(np.abs(weights(tables.model, values)).sum(axis=0), STILL * tables.static_scales)
 
 
 def _largest_static(force: Array, offset: Array, loads: Array, gravity: Array) -> Array:
@@ -282,17 +289,18 @@ def _largest_static(force: Array, offset: Array, loads: Array, gravity: Array) -
 
 
 def _scale(tables: SceneTables, values: VariantValues, numbers: Flat) -> Array:
-    """(V, J) the largest static value of every sensor, no less than `STILL` of what is usual on its body, and no less
-    than its own largest where something pushes that along its track, at which statics do not look; of a rate its own
-    largest; infinite where nothing is but rounding."""
-    columns, weight = [], np.abs(weights(tables.model, values)).sum(axis=0)
+    """(V, J) the largest static value of every sensor; its own largest where that is none, as of a rate, or where
+    something pushes its body along its track, at which statics do not look, and no less than statics that are rounding;
+    infinite where nothing is but rounding."""
+    columns, least = [], _least_static(tables, values)
     count = len(tables.model.study.sensor)
-    for sensor, usual in zip(tables.sensors[:count], tables.static_scales, strict=False):
+    for j, sensor in enumerate(tables.sensors[:count]):
         static = np.asarray(numbers[f"{sensor.name}_static"], dtype=np.float64)
         own = np.maximum(*(np.abs(np.asarray(numbers[f"{sensor.name}_{end}"])) for end in ("max", "min")))
-        static = np.maximum(static, STILL * usual * weight)
-        pushed = "along" in tables.model.pushed(sensor.body)
-        columns.append(own if sensor.offset_order else np.maximum(static, own) if pushed else static)
+        if not sensor.offset_order:
+            pushed = "along" in tables.model.pushed(sensor.body)
+            own = np.maximum(least[:, j], np.where(pushed | (static == 0.0), np.maximum(static, own), static))
+        columns.append(own)
     found = np.stack(columns, axis=1) if columns else np.zeros((values.size, 0))
     found[:, [sensor.silent(tables.model) for sensor in tables.sensors[:count]]] = np.inf
     return np.where(found > 0.0, found, np.inf)

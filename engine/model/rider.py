@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import bisect
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
-from engine.scene.motions.base import Motion, Path
+from engine.scene.motions.base import PROBED, Motion, Path
 from results_schema.arrays import Array
 
 AT_END = 1e-9  # of the body's length: a contact beyond an end by no more touches it, for its offset is rounded
@@ -129,3 +130,28 @@ class Rider:
         """Scene times at which it passes a place of the body."""
         for tau in self.motion.passing(place - self.offset):
             yield self.delay + tau / self.pace
+
+    def meets(self, other: Rider) -> tuple[float, ...]:
+        """Scene times at which it passes another one on the same body."""
+        return _meetings(self, other)
+
+    def places(self, times: Array) -> Array:
+        """Where it is at scene times, m; before and after its motion where that begins and ends."""
+        own = np.clip((times - self.delay) * self.pace, 0.0, self.motion.duration)
+        return self.motion.path(own).S + self.offset
+
+
+@lru_cache(maxsize=256)
+def _meetings(one: Rider, other: Rider) -> tuple[float, ...]:
+    from scipy.optimize import brentq
+
+    def ahead(times: Array) -> Array:
+        return one.places(times) - other.places(times)
+
+    longest = max(one.motion.duration, other.motion.duration)
+    times = np.linspace(0.0, max(one.end, other.end), PROBED * math.ceil(longest) + 1)
+    gap = ahead(times)
+    apart = np.abs(gap) > AT_END * one.length  # those side by side all the way never pass
+    times, gap = times[apart], gap[apart]
+    changes = np.flatnonzero(np.diff(np.signbit(gap)))
+    return tuple(float(brentq(ahead, times[i], times[i + 1], xtol=1e-15)) for i in changes)

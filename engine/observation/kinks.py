@@ -1,5 +1,5 @@
 """Moments at which loads pass sensors whose influence lines have a kink or a jump there: the largest moment under a
-load that passes is read there, and steps must not miss it.
+load that passes is read there, and steps must not miss it. A sensor under a carriage passes other loads and supports.
 
 In whole runs such moments are boundaries of steps. The steps of a cycle stay equidistant: there the reading is
 extrapolated, from either side, by the parabola through three stations.
@@ -35,12 +35,17 @@ class Side(NamedTuple):
 
 
 def passes(model: SceneModel, sensor: Sensor) -> Iterator[float]:
-    """Scene times at which a load passes a sensor whose influence line has a kink there, in no order."""
-    if sensor.under is None and sensor.reads.has_kinks:
-        for carriage in model.carriages:
-            for load in carriage.loads:
-                if load.body == sensor.body:
-                    yield from model.riders[load.rider].passes(sensor.at)
+    """Scene times at which a load passes a sensor whose influence line has a kink there, in no order; or at which a
+    sensor that moves passes one, or a joint of its body."""
+    if not sensor.reads.has_kinks:
+        return
+    own = None if sensor.under is None else model.riders[sensor.under]
+    if own is not None:
+        for joint in model.bodies[sensor.body].modal.joints:
+            yield from own.passes(joint)
+    for load in (load for carriage in model.carriages for load in carriage.loads if load.body == sensor.body):
+        rider = model.riders[load.rider]
+        yield from rider.passes(sensor.at) if own is None else own.meets(rider)
 
 
 def stops(model: SceneModel, sensors: Iterable[Sensor]) -> Iterator[float]:

@@ -140,12 +140,16 @@ class Sensor:
         return bool(here <= SILENT * max(elsewhere))
 
     def largest_influence(self, model: SceneModel, places: Array) -> float:
-        """Its largest static reading per unit force at places of its body's track; of a rate, of the displacement."""
+        """Its largest static reading per unit force at places of its body's track; of a rate, of the displacement.
+        Under a carriage it reads at any of them what a load at any other makes it read."""
         reader = replace(self, quantity="displacement") if self.offset_order else self
-        if self.under is not None:
+        loaded = _at_rest(places)
+        if self.under is None:
+            along: Along = (loaded, loaded)
+        else:
             reader = replace(reader, under=0)
-        everywhere = StationPath(places, np.zeros_like(places), np.zeros_like(places), True)
-        return float(np.abs(reader.unit_reading(model, (everywhere,), Attachment(1.0, self.body, 0))).max())
+            along = (_at_rest(np.repeat(places, places.size)), _at_rest(np.tile(places, places.size)))
+        return float(np.abs(reader.unit_reading(model, along, Attachment(1.0, self.body, 1))).max())
 
     def rides(self, model: SceneModel) -> int | None:
         """The rider that it moves with."""
@@ -308,6 +312,11 @@ class SprungSensor(Sensor):
 
     def sagging(self, model: SceneModel, along: Along) -> Array:
         return np.zeros(along[0].s.size)
+
+
+def _at_rest(places: Array) -> StationPath:
+    """A rider that stands at places of its track, m."""
+    return StationPath(places, np.zeros_like(places), np.zeros_like(places), True)
 
 
 def _spread(model: SceneModel, part: BodyPart, rows: Array) -> Array:

@@ -12,6 +12,7 @@ import numpy as np
 from engine.model.lane_table import weights
 from engine.model.station_path import Along, standing
 from engine.observation.contact_forces import contact_forces, contact_row
+from engine.observation.kinks import stops
 from engine.observation.readings import Sensor
 from engine.statics.equilibrium import static_state
 from results_schema.arrays import Array, Counts
@@ -117,7 +118,9 @@ class Statics:
         ways = [self.timeline.positions(rider, counts) for rider in range(len(self.model.carriages)) if places]
         passing = [_crossings(counts, way, at) for way in ways for at in places]
         bounds = np.array([segment.first for segment in self.timeline.segments if first <= segment.first <= last])
-        return np.unique(np.concatenate([counts, bounds, *passing]))
+        met = self.timeline.counts_at(np.array(list(stops(self.model, self.sensors))))
+        met = met[(met >= first) & (met <= last)]
+        return np.unique(np.concatenate([counts, bounds, *passing, met]))
 
     @cached_property
     def over_window(self) -> StaticUnit:

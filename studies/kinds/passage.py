@@ -114,7 +114,7 @@ def _largest(results: Results, sensor: str) -> str:
     amplified = times(float(gain[best]), f"the static {quantity(float(static), results.sensors[sensor])}")
     amplified += with_own_weight(results.study, sensor)
     if best == top:
-        return f"{said}, {amplified},{where}."
+        return f"{said}, {amplified}{where and f',{where}'}."
     loosely = uncertainty(results, f"dynamic_amplification {sensor}", best)
     return (
         f"{said}{where}; relative to statics it is largest{in_words(results, best)}{_at_the_end(results, best)}: "

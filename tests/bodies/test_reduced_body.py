@@ -49,6 +49,7 @@ def test_a_file_gives_the_same_body(tmp_path: Path, held: bool) -> None:
     save_body(original, tmp_path / "body.nc")
     for one, other in zip(answers(load_body(tmp_path / "body.nc"), held), answers(original, held), strict=True):
         assert np.array_equal(one, other, equal_nan=True)
+    assert len(original.joints) == 2 and set(original.joints) <= set(load_body(tmp_path / "body.nc").joints)
     first, again = (tmp_path / "body.nc").read_bytes(), tmp_path / "again.nc"
     save_body(load_body(tmp_path / "body.nc"), again)
     assert again.read_bytes() == first

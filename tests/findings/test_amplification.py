@@ -52,6 +52,12 @@ def test_an_answer_says_as_large_where_nothing_is_amplified() -> None:
     assert " as large as the static " in said and " 1 times" not in said
 
 
+@pytest.mark.parametrize("kind", ["passage", "asymmetry", "double-peak", "trajectory"])
+def test_sentences_about_one_variant_end_without_a_comma(kind: str) -> None:
+    """Where nothing is swept there is no place in the sweep to name: "1.12 times the static 39.4 mm,."."""
+    assert not [said for said in answers.answer(scenes.run(kind, "")) if ",." in said or ", ." in said]
+
+
 def study_of(kind: str, own_weight: str) -> Study:
     return load(scenes.text_of(kind).replace("modes = 3", f"modes = 3\nown_weight = {own_weight}"))
 

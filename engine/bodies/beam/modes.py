@@ -62,6 +62,7 @@ def uniform_beam(beam: Beam, modes: int) -> ModalBody:
         bending_stiffness=stiffness,
         second_moment=beam.second_moment,
         fibre_distance=math.nan if beam.fibre_distance is None else beam.fibre_distance,
+        joints=tuple(spring.at for spring in beam.springs if 0.0 < spring.at < length),
         dampers=tuple((spring.at, spring.damping) for spring in beam.springs if spring.damping > 0.0),
         shapes=BeamShapes(length, mass, unit),
         statics=beam_statics(length, stiffness, line_mass, restraints),

@@ -97,6 +97,7 @@ def _reduced(frame: Frame, spots: Spots) -> ModalBody:
     loads = numbers, everywhere[assembly.free]
     points = frame_points(read, loads, sections) if numbers else None
     bending = track.bending
+    member_ends = np.cumsum([len(assembly.mesh.chains[name]) for name, _ in frame.line.members])
     return ModalBody(
         length=frame.length,
         mass=assembly.total_mass,
@@ -105,6 +106,7 @@ def _reduced(frame: Frame, spots: Spots) -> ModalBody:
         wave_number=frozen(track.wave_number(omega)),
         bending_stiffness=float(bending[0]) if np.ptp(bending) <= 1e-9 * bending[0] else np.nan,
         dampers=(),
+        joints=tuple(track.places[member_ends[:-1]].tolist()),
         shapes=track_shapes(track, moved, forces),
         statics=statics,
         gravity_share=float(track.direction @ gravity),

@@ -201,6 +201,7 @@ class ModalBody:
     points              places off the track; None: there are none
     gauges              places that sensors read off the track, by the sensors' names
     sides               motions of the track in other directions than its loads', and what forces in these do
+    joints              inner places of the track, m, at which section forces jump or bend: supports, ends of members
     sections            section forces of bodies whose track is not one uniform beam; None: -E I w'' and its derivative
     checks              what a body out of foreign files was checked for, and what was found, in words
     """
@@ -217,6 +218,7 @@ class ModalBody:
     gravity_share: float = 1.0
     second_moment: float = np.nan
     fibre_distance: float = np.nan
+    joints: tuple[float, ...] = ()
     sections: Sections | None = None
     points: Points | None = None
     gauges: Mapping[str, Gauge] = field(default_factory=dict)

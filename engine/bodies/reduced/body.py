@@ -93,6 +93,7 @@ def load_body(path: Path | str, modes: Modes = "auto") -> ModalBody:
         **numbers,
         **parts(""),
         dampers=(),
+        joints=tuple(arrays["place"][1:-1].tolist()),  # of which the file does not know the ends of members
         shapes=TrackShapes(**parts("shapes")),
         statics=statics,
         sections=sections,
