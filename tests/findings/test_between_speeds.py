@@ -13,7 +13,6 @@ from tests.engine.build import beam, cruise, fixed, force, study
 
 WAY = cruise(0.0, 1.0, 0.8)
 COARSE = {"of": "train.tram.motion.speed", "values": ["1.00 m/s", "1.02 m/s", "1.04 m/s"]}
-EVEN = "Speeds stand 0.02 m/s apart"
 
 
 def answer_of(given: Study) -> list[str]:

@@ -49,10 +49,6 @@ class PinnedBeam:
         scale = math.sqrt(2.0 * self.mass_per_length * self.length)
         return np.where(k % 2 == 1, 2.0, 0.0) * scale / (k * math.pi)
 
-    def critical_speed(self) -> float:
-        """Speed with alpha = 1: omega_1 L/pi."""
-        return float(self.omega[0]) * self.length / math.pi
-
 
 def moving_force(beam: PinnedBeam, force: float, speed: float, x: float, t: Array) -> Array:
     """Deflection at x while a constant force crosses a resting undamped pinned beam, shape of t.
