@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from engine.model.timeline import Segment, Timeline
 
 
+BESIDE = 1e-12  # of the length: a segment that ends where readings jump is read so far inside of it
 NEAR = 1e-12  # of the length: what is beyond an end by no more is at the end
 
 
@@ -134,4 +135,7 @@ def _way(rider: Rider, segment: Segment, tau: Array, active: bool, highest: int)
         return StationPath(nowhere, nowhere, nowhere, active, highest=highest)
     path = rider.path(tau, segment.start, segment.end)
     place = np.clip(path.S, 0.0, rider.length)  # rounding must not leave the body
+    for end, inward, jumps in ((0, 1.0, segment.jumps[0]), (-1, -1.0, segment.jumps[1])):
+        if jumps:
+            place[end] += inward * BESIDE * rider.length * np.sign(path.dS[end])
     return StationPath(place, path.dS * segment.step, path.ddS * segment.step**2, active, highest=highest)

@@ -42,7 +42,8 @@ class Segment(NamedTuple):
     start, end: scene time; for free vibration both are the scene's end, and its duration follows from the body.
     first: count of the scene's stations at which it begins. active: per rider, whether it is in contact.
     fresh: an event precedes it, so accelerations are solved for anew. recorded: whether extremes count. rests: all
-    carriages are at rest where they end, or gone.
+    carriages are at rest where they end, or gone. jumps: whether it begins, and ends, where a load passes a place at
+    which readings may jump.
     """
 
     start: float
@@ -55,6 +56,7 @@ class Segment(NamedTuple):
     recorded: bool
     free: bool
     rests: bool
+    jumps: tuple[bool, bool] = (False, False)
 
     @property
     def step(self) -> float:
@@ -223,7 +225,8 @@ def _stepped(part: Segment, total: int, count: int) -> Iterator[Segment]:
     for i, (first, last) in enumerate(pairwise(bounds)):
         fresh, strikes = (part.fresh, part.strikes) if i == 0 else (False, ())
         own = part._replace(start=at[i], end=at[i + 1], steps=last - first, first=count + first)
-        yield own._replace(fresh=fresh, strikes=strikes)
+        jumps = part.jumps[0] and i == 0, part.jumps[1] and last == total
+        yield own._replace(fresh=fresh, strikes=strikes, jumps=jumps)
 
 
 @lru_cache(maxsize=64)
@@ -231,7 +234,7 @@ def _parts(riders: tuple[Rider, ...], window: Window, stops: tuple[float, ...]) 
     """The scene cut at its events, its cycles and ``stops``; a study asks for the same with many numbers of steps."""
     leading, end, recorded = riders[0], max(rider.end for rider in riders), _recorded(riders, window)
     hard = _merged([0.0, end, *(t for rider in riders for t in rider.events())], end)
-    seams = list(stops)
+    seams, passed = list(stops), sorted(stops)
     if leading.motion.period is not None:
         seams += [leading.delay + k / leading.pace for k in range(1, math.ceil(leading.motion.duration))]
     rest = max(rider.rests_from for rider in riders)
@@ -243,7 +246,8 @@ def _parts(riders: tuple[Rider, ...], window: Window, stops: tuple[float, ...]) 
         seen = recorded[0] - _SAME * end <= start < recorded[1] - _SAME * end
         strikes = tuple(_strikes(riders, active, before, (start, stop))) if fresh else ()
         rests = start >= rest - _SAME * end
-        found.append(Segment(start, stop, 0, 0, active, fresh, strikes, seen, False, rests))
+        jumps = (_near(passed, start, end), _near(passed, stop, end))
+        found.append(Segment(start, stop, 0, 0, active, fresh, strikes, seen, False, rests, jumps))
         before = active
     return tuple(found)
 
@@ -258,7 +262,10 @@ def _recorded(riders: tuple[Rider, ...], window: Window) -> tuple[float, float]:
 
 def _free_vibration(last: Segment, total: int) -> list[Segment]:
     """Slices after the end of the scene; who stands on a body and what is recorded is as ``last`` says."""
-    count, still = last.first + last.steps, last._replace(start=last.end, strikes=(), free=True, rests=True)
+    count, still = (
+        last.first + last.steps,
+        last._replace(start=last.end, strikes=(), free=True, rests=True, jumps=(False, False)),
+    )
     return [
         still._replace(steps=stop - first, first=count + first, fresh=first == 0)
         for first, stop in pairwise(_slices(total))

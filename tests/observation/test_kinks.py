@@ -94,3 +94,20 @@ def test_errors_of_a_moment_under_a_load_know_what_it_passes(bed: Table, ways: l
     for end in ("moment_max", "moment_min"):
         off = abs(float(found[end]) - float(finer[end])) / scale
         assert off <= float(found.estimated_error.sel(result=end)) + 1e-6
+
+
+FROM_REST: Table = {"kind": "point-to-point", "speed": 0.2, "acceleration": 1.0}
+READ: Table = {"sensor": {"moment": under("car", "bending_moment")}, "solver": {"tolerance": 1e-2}}
+MIRRORED = (
+    (ON_THREE, force(1.0, FROM_REST | {"start": 0.2, "end": 0.7})),
+    ([{**one, "at": 1.0 - one["at"]} for one in ON_THREE[::-1]], force(1.0, FROM_REST | {"start": 0.8, "end": 0.3})),
+)
+
+
+def test_both_values_of_what_jumps_are_read() -> None:
+    """The moment under a load jumps at a support that holds the slope: mirrored scenes, in which the load comes from
+    the other side, had other extremes by as much as a step changes them."""
+    here, mirrored = (study(beam(supports=held, damping_ratio=0.05), crossing, **READ) for held, crossing in MIRRORED)
+    one, other = run(here), run(mirrored)
+    for end in ("moment_max", "moment_min"):
+        assert float(one[end]) == pytest.approx(float(other[end]), rel=1e-9)
