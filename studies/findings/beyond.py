@@ -167,9 +167,12 @@ def _in_one_unit(axis: Axis, parts: list[Array]) -> str:
 
 
 def _common(results: Results, along: Axis, which: Mask) -> str:
-    """What else is swept and has not all of its values among some variants, in brackets."""
+    """What else is swept and has not all of its values among some variants, in brackets; "some of" where not every
+    combination of these with the values of ``along`` is among them."""
     others = [axis for axis in results.axes if axis.name != along.name]
     values = [np.unique(results.everywhere(results.dataset[axis.name])[which]) for axis in others]
     pairs = zip(others, values, strict=True)
     told = [f"{axis.noun} {replace(axis, values=own).span}" for axis, own in pairs if own.size < axis.values.size]
-    return f" ({', '.join(told)})" if told else ""
+    places = np.unique(results.everywhere(results.dataset[along.name])[which])
+    full = np.count_nonzero(which) == places.size * np.prod([own.size for own in values])
+    return f" ({'' if full else 'some of '}{', '.join(told)})" if told else ""
