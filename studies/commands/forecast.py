@@ -21,7 +21,8 @@ SECONDS = 3.0  # that measuring may take
 PATIENCE = 10.0  # the same until some variants have converged: of a run of minutes nothing is known before
 ROUNDS = (16, 64, PILOTS)  # pilots, as long as the next round is expected to end in time
 # What is said of the next three was measured with the built-in studies on two threads; the spread is over these.
-CLIMB = 10.0  # times the convergence of a few variants that pilots take on the ladder: 5 to 23
+CLIMB = 10.0  # times the convergence of a few variants that pilots take on the ladder: 2 to 23
+BROKEN_OFF = 2.5  # times the seconds after which some pilots were broken off that all of them take: 2 to 3
 AUDIT = 1.7  # times that convergence that an audit takes, one level beyond it: 1.1 to 4.3
 UNFINISHED = 2.0  # times the seconds in which variants did not converge that they take
 AROUND = 1.6  # times loading and planning: gathering and writing take about half as much
@@ -60,11 +61,7 @@ def forecast(
     end = begun + seconds
     groups = [ConvergingGroup(*scene) for scene in zip(plan.grids, plan.members, strict=True)]
     looked = _converge(plan, groups, partial(_past, begun + patience))
-    if plan.converges:
-        found: Forecast | None = _of_convergence(plan, looked, threads)
-    else:
-        found = _choose(plan, threads, looked, end, rounds)
-    found = found or _without_pilots(plan, looked, threads)
+    found = _of_convergence(plan, looked, threads) if plan.converges else _choose(plan, threads, looked, end, rounds)
     return found._replace(seconds=found.seconds + around + _audit(found.plan, looked, threads))
 
 
@@ -107,21 +104,22 @@ def _of_convergence(plan: Plan, looked: Looked, threads: int) -> Forecast:
     return Forecast(plan, title, chosen.rows(looked.parts), seconds)
 
 
-def _without_pilots(plan: Plan, looked: Looked, threads: int) -> Forecast:
-    """A study whose pilots take longer than there is time."""
+def _without_pilots(plan: Plan, looked: Looked, threads: int, tried: float) -> Forecast:
+    """A study whose pilots take longer than there is time; tried: seconds after which some were broken off, 0 where
+    there was no time to begin."""
     pilots = usual_pilots(plan.size)
     less = f"there was no time for pilots: a run measures {pilots}, and takes what they show to be enough"
     scenes = scenes_of_pilots(len(plan.grids), pilots)  # which are shared out as wholes, where there are several
-    seconds = CLIMB * looked.seconds * scenes / min(threads, scenes)
+    seconds = max(BROKEN_OFF * tried, CLIMB * looked.seconds * scenes / min(threads, scenes))
     if not looked.parts:
         return Forecast(plan, "", (), seconds, f"{less}; this may take longer")
     title = f"What {counted(len(looked.parts), 'variant')} converged with; a run takes no more than it needs"
     return Forecast(plan, title, chosen.rows(looked.parts), seconds, less)
 
 
-def _choose(plan: Plan, threads: int, looked: Looked, end: float, rounds: Sequence[int]) -> Forecast | None:
-    """More and more pilots, as many as there is time for; None where there is none."""
-    found, took = None, 0.5 * CLIMB * looked.seconds / LONGER
+def _choose(plan: Plan, threads: int, looked: Looked, end: float, rounds: Sequence[int]) -> Forecast:
+    """More and more pilots, as many as there is time for."""
+    found, took, tried = None, 0.5 * CLIMB * looked.seconds / LONGER, 0.0
     for pilots in rounds:
         trial, started = replace(plan), time.perf_counter()
         if not looked.parts or started + LONGER * took > end:
@@ -129,11 +127,12 @@ def _choose(plan: Plan, threads: int, looked: Looked, end: float, rounds: Sequen
         try:
             trial.choose(Shared(Threads(threads), partial(_past, end)), pilots)
         except Halted:
+            tried = time.perf_counter() - started
             break
         took = time.perf_counter() - started
         found = trial, pilots, took
     if found is None:
-        return None
+        return _without_pilots(plan, looked, threads, tried)
     trial, pilots, took = found
     usual = usual_pilots(plan.size)
     more = "" if pilots >= usual else f"; a run measures {usual} and knows better"
