@@ -56,7 +56,7 @@ class Segment(NamedTuple):
     recorded: bool
     free: bool
     rests: bool
-    jumps: tuple[bool, bool] = (False, False)
+    jumps: tuple[bool, bool]
 
     @property
     def step(self) -> float:

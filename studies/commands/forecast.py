@@ -20,7 +20,7 @@ from studies.results.places import spread
 SECONDS = 3.0  # that measuring may take
 PATIENCE = 10.0  # the same until some variants have converged: of a run of minutes nothing is known before
 ROUNDS = (16, 64, PILOTS)  # pilots, as long as the next round is expected to end in time
-# What is said of the next three was measured with the built-in studies on two threads; the spread is over these.
+# What is said of the next four was measured with the built-in studies on two threads; the spread is over these.
 CLIMB = 10.0  # times the convergence of a few variants that pilots take on the ladder: 2 to 23
 BROKEN_OFF = 2.5  # times the seconds after which some pilots were broken off that all of them take: 2 to 3
 AUDIT = 1.7  # times that convergence that an audit takes, one level beyond it: 1.1 to 4.3

@@ -75,6 +75,7 @@ def swept(**axes: dict[str, Any]) -> dict[str, Any]:
 def same(one: Study, other: Study) -> None:
     """Bit for bit, whatever the sweep's keys are."""
     first, second = engine.run(one), engine.run(other)
+    assert (first.status == 0).all()
     assert first.drop_attrs().identical(second.drop_attrs())
 
 

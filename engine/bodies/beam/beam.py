@@ -184,7 +184,8 @@ class Beam(Body):
         return [(f"supports.{number}.damping", s.at, s.damping) for number, s in enumerate(self.springs)]
 
     def doubts(self, here: str) -> list[Doubt]:
-        return section_doubts(here, f"{here}.length", *["fibre_distance"] * (self.fibre_distance is not None))
+        fibres = () if self.fibre_distance is None else ("fibre_distance",)
+        return section_doubts(here, f"{here}.length", *fibres)
 
     def checks(self, here: str) -> list[Check]:
         checks = []
