@@ -299,7 +299,7 @@ def test_a_full_disk_is_code_74_and_the_next_start_finishes(
     write(here)
     assert main(["run", "small.toml", "-o", "clean.nc"]) == 0
     clean = open_archive("clean.nc").root
-    for number in range(1, 60, 11):
+    for number in range(1, 60, 7):
         monkeypatch.setattr(files, "FAULTS", FailNth(number))
         capsys.readouterr()
         code = main(["run", "small.toml"])

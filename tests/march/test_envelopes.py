@@ -169,7 +169,7 @@ def digest(plan: Plan, chunk: int | None, threads: int) -> dict[str, bytes]:
 
 
 def mixed() -> Study:
-    """12 variants on springs, which all carry values."""
+    """25 variants on springs, which all carry values."""
     data = dict(test_determinism.mixed().data)
     sweep = {name: axis for name, axis in data["sweep"].items() if name in ("speed", "weight")}
     envelopes = {"shape": along(places=9), "moments": along("bending_moment", places=5)}
@@ -184,7 +184,7 @@ def test_same_bits_for_any_chunks_and_threads() -> None:
     given = mixed()
     whole = digest(make_plan(given), None, 2)
     assert "shape_envelope_max" in whole
-    assert digest(make_plan(given), 7, 1) == whole
+    assert digest(make_plan(given), 17, 1) == whole
 
 
 REFUSED: dict[str, tuple[dict[str, Any], str]] = {

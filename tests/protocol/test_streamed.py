@@ -40,7 +40,7 @@ def on_disk_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(parts, "IN_MEMORY", 0)
     monkeypatch.setattr(tabulated, "ROWS_AT_ONCE", 17)
     monkeypatch.setattr(reading, "IN_MEMORY", 0)
-    monkeypatch.setattr(reading, "CHUNK_BYTES", 300)
+    monkeypatch.setattr(reading, "CHUNK_BYTES", 100)
 
 
 def many_parts(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -115,12 +115,12 @@ def test_a_disk_that_is_full_then_is_code_74(
     assert_same_archives(whole, open_archive(ran("passage", tmp_path / "a.nc")))
 
 
+@pytest.mark.parametrize("kind", KINDS)
 def test_commands_read_the_same(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Of one kind: `test_the_archive_is_the_same` reads those of all."""
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "0")
-    path = ran("passage", tmp_path / "a.nc")
+    path = ran(kind, tmp_path / "a.nc")
     capsys.readouterr()
     expected = told(path, tmp_path / "one", capsys)
     on_disk_alone(monkeypatch)

@@ -78,7 +78,7 @@ def equilibrium(case: Variants, s: float) -> Array:
     return np.repeat(row[None, :], len(case.mass), axis=0)
 
 
-def integrate(case: Variants, motion: Motion, times: Array, start: Array, rtol: float = 1e-10) -> Passage:
+def integrate(case: Variants, motion: Motion, times: Array, start: Array, rtol: float = 1e-11) -> Passage:
     """Histories at `times` from coordinates `start` (C, N) at rest; dense output of order 7 between steps."""
     shape = (len(case.mass), case.modes)
     half = shape[0] * shape[1]

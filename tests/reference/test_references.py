@@ -237,7 +237,7 @@ def asymmetry_indices(stations: int = 401) -> dict[tuple[float, float], indices.
     runs = [np.linspace(run.start, run.end, stations) for run in (out, back)]
     case = passages.variants(values.ASYMMETRY_MODES, [(row.mu, row.zeta, 1.0) for row in values.ASYMMETRY])
     start = passages.equilibrium(case, values.ASYMMETRY_START)
-    result = passages.integrate(case, motion, np.concatenate([[0.0], *runs]), start, rtol=1e-7)
+    result = passages.integrate(case, motion, np.concatenate([[0.0], *runs]), start, rtol=1e-9)
     s = result.s[1 : stations + 1]
     beam = PinnedBeam(values.ASYMMETRY_MODES)
     flexibility = WEIGHT * beam.phi(0.5, 0) / beam.omega**2

@@ -170,6 +170,14 @@ def test_as_many_rigid_contacts_as_the_modes_of_all_bodies_meet() -> None:
         make_plan(gantry(wheels=wheels | {"c": wheels["a"] | {"offset": 0.05}}, body=box, more=one))
 
 
+def test_bodies_that_ride_on_each_other_are_refused() -> None:
+    cart = {"kind": "rigid", "length": 0.1, "mass": 0.2, "inertia": 3e-4}
+    trolley = CART | {"contacts": SHOES}
+    wheels = PAIRS | {"right_rear": PAIRS["right_rear"] | {"on": "cart"}}
+    with pytest.raises(BadInput, match=r"crane\.body: a body cannot ride on itself"):
+        gantry(trolley, wheels, more={"cart": cart})
+
+
 def test_all_of_them_deflect_along_gravity_alike() -> None:
     """A frame whose track is loaded aslant does not carry wheels together with a beam."""
     aslant = rail(0.9, 8, HELD, direction=[0.0, 0.6, -0.8])
