@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from engine.accuracy.grids import AVERAGE_ACCELERATION, FOX_GOODWIN, SceneGrid, swift_scheme_fits
 from engine.accuracy.jobs import Halted, InTurn, Job, Share
-from engine.accuracy.reference import Converged, as_fixed, converge, in_full, is_free
+from engine.accuracy.reference import Converged, Level, as_fixed, converge, in_full, is_free
 from engine.accuracy.results import deciding, differences, results_of, worst_held
 from engine.kernels.schemes import Scheme
-from engine.march.outcome import Asked, outcome, vibration
+from engine.march.outcome import Asked, Outcome, outcome, vibration
 from engine.march.step_rules import least_steps
 from engine.model.numerics import Numerics, open_bodies
 from engine.model.scene_model import SceneModel
@@ -42,9 +42,6 @@ FLAT = 1.2  # times what a column leaves, from where finer rungs gain nothing: 1
 MORE = 2.0  # times the fewest modes that leave little: with 1.4 some variants missed the tolerance, 4 gained nothing
 JUDGED_BY = 12  # modes, at least, of the column that says whether a simpler model can do at all: 6 to 24 took 0.8 to 1
 ENOUGH = 0.2  # of the tolerance, where pilots climb no further: with 0.4 some variants missed it, 0.1 gained nothing
-#: Of the tolerance, by a rung of the last scheme, for all pilots of a scene: dearer ones of other schemes are not
-#: climbed, as none would be taken. Of a gantry's pilots they took three quarters of the time.
-LEAVES = 0.5
 REFERENCE_PART = 0.25  # of the tolerance by which references may be off, which what they judge is told to be off too
 
 
@@ -132,28 +129,40 @@ class Rungs:
     span: tuple[float, float]
     truth: Converged
     aim: Converged
+    levels: dict[int, Level]
     _rules: dict[int, tuple[Array, Array]] = field(default_factory=dict)
 
     def march(self, lanes: Counts, halted: Halted, column: int, rung: int) -> March:
         """March some pilots on a rung. Raises Halted."""
-        model, by, values = self.model(column), self.ladder.cuts[rung], self.values.part(lanes)
+        model, by = self.model(column), self.ladder.cuts[rung]
         tables = self.grid.once(model, by)
-        now = outcome(self.grid.asked, tables, values, self.grid.stations(model, by), halted)
+        now = outcome(self.grid.asked, tables, self.values.part(lanes), self.grid.stations(model, by), halted)
         tables.forget()
-        results = deciding(results_of(self.grid.asked), self.grid.asked.study.solver.tolerance)
-        error = differences(self.grid.asked, model, values, now, self.truth.outcome.of(lanes))
+        return self._measured(column, rung, lanes, now, float(lanes.size * model.body_modes * tables.steps))
+
+    def marched(self, lanes: Counts, column: int) -> Iterator[March]:
+        """The marches of some pilots that were levels of their references."""
+        level = self.levels[column]
+        own = np.searchsorted(level.lanes, lanes)
+        for by in np.unique(level.by[own]):
+            part = level.by[own] == by
+            yield self._measured(column, self.ladder.cuts.index(by), lanes[part], level.outcome.of(own[part]), 0.0)
+
+    def _measured(self, column: int, rung: int, lanes: Counts, now: Outcome, work: float) -> March:
+        """What pilots report on a rung, beside their references."""
+        model, values, asked = self.model(column), self.values.part(lanes), self.grid.asked
+        results = deciding(results_of(asked), asked.study.solver.tolerance)
+        error = differences(asked, model, values, now, self.truth.outcome.of(lanes))
         against = error
         if self.aim is not self.truth:
-            against = differences(self.grid.asked, model, values, now, self.aim.outcome.of(lanes))
-        work, finer = float(lanes.size * model.body_modes * tables.steps), np.ones(lanes.size, dtype=np.bool_)
+            against = differences(asked, model, values, now, self.aim.outcome.of(lanes))
+        finer = np.ones(lanes.size, dtype=np.bool_)
         return March(column, rung, lanes, error, worst_held(against, results), finer, work)
 
-    def climb(self, lanes: Counts, halted: Halted, column: int, floor: Array, most: float) -> list[March]:
+    def climb(self, lanes: Counts, halted: Halted, column: int, floor: Array, most: Array) -> list[March]:
         """From the coarsest rung that each of some pilots may take, until nothing is gained, or the next one would be
-        more work than ``most``; floor (P,): what the column leaves. Raises Halted."""
-        cuts, fine = np.array(self.ladder.cuts), self.fine(column)
-        least, periods = self.least(column)
-        rung = np.searchsorted(cuts, np.maximum(least, FIRST / self.unit(column) * periods))
+        more work than ``most`` (P,); floor (P,): what the column leaves. Raises Halted."""
+        cuts, fine, rung = np.array(self.ladder.cuts), self.fine(column), self.first(column)
         active, found = lanes[rung[lanes] < np.minimum(fine[lanes], cuts.size)], list[March]()
         while active.size:
             here = int(rung[active].min())
@@ -162,17 +171,31 @@ class Rungs:
             small = now.held <= np.maximum(ENOUGH * self.span[0], FLAT * floor[own])
             rung[own] += 1
             done = small | (rung[own] >= np.minimum(fine[own], cuts.size))
-            dear = ~done & (self.work(column)[min(here + 1, cuts.size - 1)] > most)
+            dear = ~done & (self.work(column)[min(here + 1, cuts.size - 1)] > most[own])
             found.append(now._replace(finer=~dear))
             active = active[~np.isin(active, own[done | dear])]
         return found
 
+    def first(self, column: int) -> Counts:
+        """(P,) the coarsest rung that pilots may take."""
+        least, periods = self.least(column)
+        return np.searchsorted(np.array(self.ladder.cuts), np.maximum(least, FIRST / self.unit(column) * periods))
+
     def fine(self, column: int) -> Counts:
-        """(P,) the rung at which a column's modes are judged."""
+        """(P,) the rung at which a column's modes are judged: that of the reference's level, where it is one."""
         least, periods = self.least(column)
         of_period, of_grid = FINE.get(self.model(column).scheme.name, FINE[""])
         wanted = np.maximum(least, np.maximum(of_period / self.unit(column) * periods, of_grid))
+        if column in self.levels:
+            wanted[self.levels[column].lanes] = self.levels[column].by
         return np.searchsorted(np.array(self.ladder.cuts), wanted)
+
+    def known(self, column: int) -> NDArray[np.bool_]:
+        """(P,) whether a column was a level of the reference, on one of the ladder's rungs."""
+        found = np.zeros(self.values.size, dtype=np.bool_)
+        if column in self.levels:
+            found[self.levels[column].lanes] = self.levels[column].by <= self.ladder.cuts[-1]
+        return found
 
     def least(self, column: int) -> tuple[Array, Array]:
         """(P,) the least steps in one of the grid's, and first periods per unit of scene time."""
@@ -219,9 +242,11 @@ class Climb:
         """Find the references of the pilots, what each model and number of modes can do for them, and with how many
         steps. Raises Halted, and Crashed by the places of pilots."""
         refer = partial(converge, self.grid, self.values, part=REFERENCE_PART, share=self.share)
-        truth = refer(levels=in_full(self.grid))
-        aim = truth if is_free(self.grid) else refer(levels=as_fixed(self.grid))
-        self.rungs = Rungs(self.grid, self.values, self.ladder, self.span, truth, aim)
+        levels = list[Level]()
+        aim = refer(levels=as_fixed(self.grid), seen=levels.append)
+        truth = aim if is_free(self.grid) else refer(levels=in_full(self.grid))
+        on_ladder = {self.ladder.columns.index(v.numerics): v for v in levels if v.numerics in self.ladder.columns}
+        self.rungs = Rungs(self.grid, self.values, self.ladder, self.span, truth, aim, on_ladder)
         shape = len(self.ladder.columns), len(self.ladder.cuts), self.values.size
         self.found = [(np.zeros(1, dtype=np.int64), np.full((1, len(truth.error)), np.inf))]
         self.march = np.zeros(shape, dtype=np.int32)
@@ -229,7 +254,7 @@ class Climb:
         self.marched = np.zeros(shape[:2], dtype=np.bool_)
         for name in dict.fromkeys(numerics.fidelity for numerics in self.ladder.columns):
             self._judge(name)
-        for scheme in reversed(dict.fromkeys(numerics.scheme for numerics in self.ladder.columns)):
+        for scheme in dict.fromkeys(numerics.scheme for numerics in self.ladder.columns):
             for marches in self.share(self.rungs, list(self._climbs(scheme))):
                 self._take(marches)
         for name, enough in self.enough.items():
@@ -276,35 +301,43 @@ class Climb:
     def _floor(self, column: int, fits: NDArray[np.bool_]) -> Array:
         """(P,) what a column leaves with so many steps that its modes and its model alone do; infinite where these
         would be more work than the reference."""
-        if not fits.any():
-            return np.full(self.values.size, np.inf)
-        cuts, fine, rungs = np.array(self.ladder.cuts), self.rungs.fine(column), self.rungs
-        work = cuts[np.minimum(fine, cuts.size - 1)] * rungs.unit(column) * rungs.model(column).body_modes
-        lanes = np.flatnonzero(fits & (fine < cuts.size) & (work <= rungs.truth.used["work"]))
-        self._march(column, {int(rung): lanes[fine[lanes] == rung] for rung in np.unique(fine[lanes])[::-1]})
         found = np.full(self.values.size, np.inf)
+        if not fits.any():
+            return found
+        cuts, fine, rungs = np.array(self.ladder.cuts), self.rungs.fine(column), self.rungs
+        known = fits & rungs.known(column)
+        if known.any():
+            self._take(rungs.marched(np.flatnonzero(known), column))
+        work = cuts[np.minimum(fine, cuts.size - 1)] * rungs.unit(column) * rungs.model(column).body_modes
+        fits = fits & (fine < cuts.size) & (work <= rungs.truth.used["work"])
+        lanes = np.flatnonzero(fits & ~known)
+        self._march(column, {int(rung): lanes[fine[lanes] == rung] for rung in np.unique(fine[lanes])[::-1]})
+        lanes = np.flatnonzero(fits | known)
         found[lanes] = self.held[column, fine[lanes], lanes]
         return found
 
     def _climbs(self, scheme: Scheme) -> Iterator[Job[list[March]]]:
-        """Of all columns of a scheme that can hold the tolerance of some pilots at all, as far as no other scheme holds
-        well for all with less work."""
+        """Of all columns of a scheme that can hold the tolerance of some pilots at all, from where none of lower order
+        holds well, as far as none of higher order is known to hold well with less work."""
         for column, floor in self.floor.items():
-            numerics = self.ladder.columns[column]
-            worth = np.flatnonzero(floor <= HOPELESS * self.span[1])
-            if worth.size and numerics.scheme == scheme:
-                most = self._least_work(numerics)
+            own = self.ladder.columns[column]
+            if own.scheme != scheme:
+                continue
+            most = np.full(self.values.size, np.inf)
+            for other in (c for c in self.floor if c != column and own == self._with_scheme(c, scheme)):
+                well = self.held[other] <= ENOUGH * self.span[0]
+                most = np.minimum(most, np.where(well, self.rungs.work(other)[:, None], np.inf).min(axis=0))
+                if other < column:
+                    first = np.where(well.any(axis=0), np.argmax(well, axis=0), len(well))
+                    self._no_worse(column, other, np.flatnonzero(first <= self.rungs.first(column)))
+            first = np.minimum(self.rungs.first(column), len(self.ladder.cuts) - 1)
+            known = np.isfinite(self.held[column, first, np.arange(first.size)])
+            worth = np.flatnonzero((floor <= HOPELESS * self.span[1]) & ~known)
+            if worth.size:
                 yield Job(partial(Rungs.climb, column=column, floor=floor, most=most), worth)
 
-    def _least_work(self, beside: Numerics) -> float:
-        """Modes x steps of the cheapest marched rung of the same model by other schemes that holds well for all pilots;
-        infinite where none does."""
-        least = np.inf
-        for column, numerics in enumerate(self.ladder.columns):
-            if numerics.fidelity == beside.fidelity and numerics.scheme != beside.scheme:
-                holds = np.all(self.held[column] <= LEAVES * self.span[0], axis=1)
-                least = min(least, float(self.rungs.work(column)[holds].min(initial=np.inf)))
-        return least
+    def _with_scheme(self, column: int, scheme: Scheme) -> Numerics:
+        return self.ladder.columns[column]._replace(scheme=scheme)
 
     def _march(self, column: int, pilots: Mapping[int, Counts]) -> None:
         """March some pilots on each of some rungs."""
@@ -328,10 +361,14 @@ class Climb:
         for column, numerics in enumerate(self.ladder.columns):
             if numerics.fidelity != name:
                 continue
-            previous = before.get(numerics.scheme)
             lanes = np.flatnonzero((numerics.modes > enough) & ~np.isfinite(self.held[column]).any(axis=0))
-            if previous is not None and lanes.size:
-                allowed = np.array(self.ladder.cuts)[:, None] >= self.rungs.least(column)[0][lanes]
-                self.held[column][:, lanes] = np.where(allowed, self.held[previous][:, lanes], np.inf)
-                self.march[column][:, lanes] = np.where(allowed, self.march[previous][:, lanes], 0)
+            if numerics.scheme in before:
+                self._no_worse(column, before[numerics.scheme], lanes)
             before[numerics.scheme] = column
+
+    def _no_worse(self, column: int, other: int, lanes: Counts) -> None:
+        """Unknown rungs of a column that some pilots may take are no worse than those of another with as many steps."""
+        allowed = np.array(self.ladder.cuts)[:, None] >= self.rungs.least(column)[0][lanes]
+        rungs, own = np.nonzero(allowed & ~np.isfinite(self.held[column][:, lanes]))
+        for told in (self.held, self.march):
+            told[column, rungs, lanes[own]] = told[other, rungs, lanes[own]]

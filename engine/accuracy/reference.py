@@ -8,7 +8,7 @@ ratios vary by chance, five times that is told where it is far below d, and no l
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal, NamedTuple
@@ -115,6 +115,15 @@ def is_free(grid: SceneGrid) -> bool:
     return whole and terms and study.solver.scheme == "auto" and not grid.fixed
 
 
+class Level(NamedTuple):
+    """What variants (by their places) report by a level, and the steps that each took in one of the grid's."""
+
+    numerics: Numerics
+    lanes: Counts
+    by: Counts
+    outcome: Outcome
+
+
 class Marches(NamedTuple):
     """Variants that are marched level by level."""
 
@@ -130,12 +139,14 @@ def converge(
     part: float,
     beyond: Beyond = NO_FURTHER,
     share: Share = IN_TURN,
+    seen: Callable[[Level], object] = lambda level: None,
 ) -> Converged:
     """March variants level by level until what is held is off by no more than ``part`` of its tolerance, and
-    levels ``beyond``; ``share`` does the marches of a level. Raises Halted, and Crashed by the places of variants."""
+    levels ``beyond``; ``share`` does the marches of a level, ``seen`` is shown what they find. Raises Halted, and
+    Crashed by the places of variants."""
     asked, results = grid.asked, results_of(grid.asked)
     decisive = deciding(results, asked.study.solver.tolerance)
-    march = partial(_march, Marches(grid, values, levels), share)
+    march = partial(_march, Marches(grid, values, levels), share, seen)
     pushes_along = any("along" in carriage.pushes for carriage in asked.study.carriage.values())
     stays = STAYS if levels.numerics[0].static_correction else STAYS_UNCORRECTED
     now, spent = march(np.arange(values.size), 0)
@@ -206,14 +217,21 @@ def _updated(found: Converged, lanes: Counts, now: Outcome, spent: Flat, error: 
     return replace(found, outcome=everything, error=errors, used=used_)
 
 
-def _march(marches: Marches, share: Share, lanes: Counts, level: int) -> tuple[Outcome, Flat]:
+def _march(
+    marches: Marches, share: Share, seen: Callable[[Level], object], lanes: Counts, level: int
+) -> tuple[Outcome, Flat]:
     """One level of some of the variants, ascending, each with its own number of steps."""
     grid, values, levels = marches
     by = _by(grid, values.part(lanes), levels, level)
     cuts = [int(cut) for cut in np.unique(by)[::-1]]
     marched = list(share(marches, [Job(partial(_on_cut, level=level, cut=cut), lanes[by == cut]) for cut in cuts]))
-    if len(marched) == 1:
-        return marched[0][1:]
+    found, spent = marched[0][1:] if len(marched) == 1 else _together(marched, lanes)
+    seen(Level(levels.numerics[level], lanes, by, found))
+    return found, spent
+
+
+def _together(marched: Sequence[tuple[Counts, Outcome, Flat]], lanes: Counts) -> tuple[Outcome, Flat]:
+    """Marches of parts of variants as one."""
     found, spent = marched[0][1].of(np.zeros(lanes.size, dtype=np.int64)), Flat()  # as large, yet to be filled
     for own, now, taken in marched:
         here = np.searchsorted(lanes, own)
