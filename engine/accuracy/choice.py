@@ -14,9 +14,10 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.accuracy.climb import Climb, Measured
 from engine.accuracy.grids import SceneGrid
 from engine.accuracy.jobs import Crashed, Halted, Job, Share, over_scenes
-from engine.accuracy.ladder import Climb, Ladder, Measured, ladder_of
+from engine.accuracy.ladder import Ladder, ladder_of
 from engine.accuracy.neighbour_errors import (
     TELLING,
     NeighbourErrors,

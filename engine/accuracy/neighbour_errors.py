@@ -21,7 +21,7 @@ from engine.march.outcome import Asked
 from results_schema.arrays import Array
 
 if TYPE_CHECKING:
-    from engine.accuracy.ladder import Measured
+    from engine.accuracy.climb import Measured
 
 Numbers = NDArray[np.int32]
 

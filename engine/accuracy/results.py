@@ -23,7 +23,7 @@ from results_schema.statuses import lost
 if TYPE_CHECKING:
     from engine.march.outcome import Asked, Outcome
     from engine.model.scene_model import SceneModel
-    from engine.scene.sensors import Sensor
+    from engine.scene.sensors import Envelope, Sensor
     from engine.scene.study import Study
     from engine.scene.variants import VariantValues
 
@@ -138,7 +138,7 @@ def _held_of(asked: Asked, sensor: Sensor, most: int) -> tuple[float, bool]:
     """The tolerance of a sensor's readings, and whether it is the study's; none where they hardly converge."""
     if asked.at_once and sensor.tolerance is None and QUANTITIES[sensor.quantity].order > most:
         return np.nan, False
-    return _held(asked.study, sensor.quantity, sensor.tolerance)
+    return _held(asked.study, sensor, sensor.tolerance)
 
 
 def _of_accelerations(asked: Asked) -> Iterator[Entry]:
@@ -157,14 +157,14 @@ def _of_contact_forces(asked: Asked) -> Iterator[Entry]:
 def _of_envelopes(asked: Asked) -> Iterator[Entry]:
     for name in envelope_names(asked.study):
         own = name.rpartition("_envelope_")[0]
-        held = _held(asked.study, asked.study.envelope[own].quantity, None)
+        held = _held(asked.study, asked.study.envelope[own], None)
         yield Result(name, own, *held), partial(Pair.envelope, name=name)
 
 
 def _of_cycles(asked: Asked) -> Iterator[Entry]:
     for result in () if asked.reduction is None else asked.reduction.compared:
         for j, (name, sensor) in enumerate(asked.study.sensor.items()):
-            held = _held(asked.study, sensor.quantity, sensor.tolerance)
+            held = _held(asked.study, sensor, sensor.tolerance)
             yield Result(f"{result} {name}", name, *held), partial(Pair.cycle, name=result, sensor=j)
 
 
@@ -187,10 +187,12 @@ def differences(asked: Asked, model: SceneModel, values: VariantValues, one: Out
     return found
 
 
-def _held(study: Study, quantity: str, own: float | str | None) -> tuple[float, bool]:
-    """The tolerance of what a sensor reads, and whether it is the study's."""
+def _held(study: Study, reads: Sensor | Envelope, own: float | str | None) -> tuple[float, bool]:
+    """The tolerance of what a sensor or an envelope reads, and whether it is the study's: accelerations that count the
+    modes up to a limit converge."""
     if own is None:
-        return (np.nan, False) if QUANTITIES[quantity].told else (study.solver.tolerance, True)
+        told = QUANTITIES[reads.quantity].told and reads.frequency_limit is None
+        return (np.nan, False) if told else (study.solver.tolerance, True)
     return (np.nan if own == "told" else float(own), False)
 
 

@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from engine.accuracy.choice import usual_pilots
+from engine.accuracy.climb import REFERENCE_PART
 from engine.accuracy.grids import SceneGrid
 from engine.accuracy.groups import PACE, USED
 from engine.accuracy.jobs import Crashed, Halted, Job, Share, over_scenes
-from engine.accuracy.ladder import REFERENCE_PART
 from engine.accuracy.reference import DEAR, IN_TURN, Beyond, Converged, converge, in_full, passages, usual_work
 from engine.accuracy.results import differences, results_of
 from engine.batch.chunk import told_errors

@@ -133,6 +133,11 @@ class Sensor(Spec):
         return self
 
     @property
+    def takes_limit(self) -> bool:
+        """Whether a `frequency_limit` could say which modes count in what it reads."""
+        return self.rides is None and self.reads.rate > 0
+
+    @property
     def fixed_place(self) -> float | None:
         """The place of the track, m, at which it reads whatever happens; None where it has no such."""
         return self.at if self.spot is None else None

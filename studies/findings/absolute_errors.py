@@ -15,6 +15,7 @@ from studies.results.formatting import quantity
 from studies.results.results import Results
 
 LOOSE_PART = 0.1  # of a value: an estimated error above stands beside it
+LEAST_PART = 0.1  # of the true value, that what is reported counts as at least: beyond nothing is known
 OF_TOOLS = ("error_moving", "error_working", "error_holding")
 OF_RAILS = ("deflection_largest", "stress_largest")
 
@@ -29,7 +30,11 @@ def absolute_errors(results: Results, name: str, sensor: str = "") -> Array:
     """
     own = name in (*OF_TOOLS, *OF_RAILS)
     told = f"{name.partition('_')[0]} of {sensor}" if own else f"{name} {sensor}".strip()
-    return results.estimated_error(told) * results.everywhere(_scale(results, name, sensor))
+    error, (known, reported) = results.estimated_error(told), _scales(results, name, sensor)
+    # What is reported is off itself: the true one, which errors are parts of, may be larger by as much.
+    return error * np.fmax(
+        results.everywhere(known), results.everywhere(reported) / np.maximum(1.0 - error, LEAST_PART)
+    )
 
 
 def told_error(error: float, value: float, units: str) -> str:
@@ -46,42 +51,43 @@ def weight(results: Results, carriage: str) -> Any:
     return sum(masses) * results.parameter("gravity")
 
 
-def _scale(results: Results, name: str, sensor: str) -> Any:
-    """What the estimated error of a result is a part of, in the result's unit."""
+def _scales(results: Results, name: str, sensor: str) -> tuple[Any, Any]:
+    """What the estimated error of a result is a part of, in the result's unit: what is known, and what the variant
+    reports itself; the larger one counts, NaN is none."""
     dataset, stem = results.dataset, name.rpartition("_")[0]
     if name in OF_TOOLS:
-        return _largest([results.of_sensor(one, sensor) for one in OF_TOOLS])
+        return np.nan, _largest([results.of_sensor(one, sensor) for one in OF_TOOLS])
     if name in OF_RAILS:
-        return results.of_sensor(name, sensor)
+        return np.nan, results.of_sensor(name, sensor)
     if name == "lag":
-        return _cruise(results)
+        return _cruise(results), np.nan
     if name.endswith("_settling_time"):
-        return dataset[name]
+        return np.nan, dataset[name]
     if f"{stem}_max" in dataset and f"{stem}_min" in dataset:
-        return _scale_of_ends(results, stem, _largest([dataset[f"{stem}_max"], dataset[f"{stem}_min"]]))
-    return 1.0  # an index
+        return _scales_of_ends(results, stem, _largest([dataset[f"{stem}_max"], dataset[f"{stem}_min"]]))
+    return 1.0, np.nan  # an index
 
 
-def _scale_of_ends(results: Results, stem: str, own: xr.DataArray) -> Any:
+def _scales_of_ends(results: Results, stem: str, own: xr.DataArray) -> tuple[Any, Any]:
     """The same of what has a largest and a smallest value; own: the larger magnitude of both."""
     moves = kind_named(results.study.kind).moves_frames
     if stem in results.sensors and "dynamic_amplification" in results.dataset:
         static = own / results.of_sensor("dynamic_amplification", stem)
-        body = results.study.body_of(stem)
+        known, body = np.isfinite(static), results.study.body_of(stem)
         if any("along" in carriage.pushes and carriage.on == body for carriage in results.study.carriage.values()):
-            return np.maximum(static.fillna(0.0), own)
-        return static.where(np.isfinite(static), own)
+            return static.where(known), own
+        return static.where(known), own.where(~known)
     whole = stem.removesuffix(AFTER_STOP)
     if whole != stem and whole in results.sensors:
-        return _largest([results.dataset[f"{whole}_max"], results.dataset[f"{whole}_min"]])
+        return np.nan, _largest([results.dataset[f"{whole}_max"], results.dataset[f"{whole}_min"]])
     carriage = next((one for one in results.study.carriage if stem.startswith(f"{one}_")), "")
     what = stem.removeprefix(f"{carriage}_")
     if what == "contact_force" and not moves:
-        return weight(results, carriage)
+        return weight(results, carriage), np.nan
     if what == "position" and moves:
         track = results.models.get(results.study.carriage[carriage].on)
-        return np.nan if track is None else float(track["length"])
-    return own
+        return (np.nan if track is None else float(track["length"])), np.nan
+    return np.nan, own
 
 
 def _largest(parts: list[xr.DataArray]) -> xr.DataArray:

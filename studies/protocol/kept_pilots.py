@@ -48,7 +48,7 @@ class KeptPilots:
 def _found(table: Table) -> Found:
     """What a part holds."""
     from engine.accuracy.choice import Found
-    from engine.accuracy.ladder import Measured
+    from engine.accuracy.climb import Measured
 
     values = {name: column.data for name, column in table.columns.items()}
     scene, pilots = int(values.pop(_SCENE)), values.pop(_PILOTS)

@@ -88,9 +88,10 @@ def uncertainty(results: Results, result: str, place: Index) -> str:
     ends = ("max", "min")
     sensor = next((name for name in results.sensors if result in [f"{name}_{end}" for end in ends]), "")
     free = sensor and np.isnan(float(results.dataset["tolerance"].sel(result=result)))
-    remedy = f"; a `tolerance` of its own on sensor {sensor} asks for more" if free else ""
-    if sensor and results.study.sensor[sensor].reads.rate == 2:
-        remedy = "; where loads arrive at once it grows with every mode: `modes` says up to which frequency it counts"
+    asks = "a tolerance of its own"
+    if free and results.study.sensor[sensor].takes_limit:
+        asks = f"a frequency_limit or {asks}"
+    remedy = f"; {asks} on sensor {sensor} asks for more" if free else ""
     return f" (estimated to within {percent(error)}{remedy})"
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.accuracy.ladder import Measured
+from engine.accuracy.climb import Measured
 from engine.accuracy.neighbour_errors import (
     AGAINST_SLOPES,
     NeighbourErrors,

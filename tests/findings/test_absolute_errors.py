@@ -63,7 +63,24 @@ def test_errors_of_a_body_that_is_pushed_are_over_the_largest_value() -> None:
     own = np.maximum(abs(results.dataset.sway_max), abs(results.dataset.sway_min)).values
     assert np.all(results.numbers("dynamic_amplification", "sway") > 2.0)
     told = absolute_errors(with_error(results, "sway_max", 0.25), "sway_max")
-    np.testing.assert_allclose(told, 0.25 * own, rtol=1e-6)
+    np.testing.assert_allclose(told, 0.25 * own / 0.75, rtol=1e-6)
+
+
+def test_errors_over_a_value_of_its_own_know_that_it_is_off_itself() -> None:
+    """An acceleration that is 45 % too small is told to be off by as much as it is: 0.45 of the true one."""
+    extra = """
+    [sensor.shaken]
+    body = "bed"
+    at = 5.0
+    quantity = "acceleration"
+    """
+    true = found("passage", extra=extra)
+    small = Results(true.dataset.assign(shaken_max=0.55 * true.dataset.shaken_max), true.study, true.models)
+    small = Results(small.dataset.assign(shaken_min=0.55 * true.dataset.shaken_min), true.study, true.models)
+    own = np.maximum(abs(true.dataset.shaken_max), abs(true.dataset.shaken_min)).values
+    told = absolute_errors(with_error(small, "shaken_max", 0.45), "shaken_max")
+    np.testing.assert_allclose(told, 0.45 * own, rtol=1e-6)
+    assert np.isfinite(absolute_errors(with_error(small, "shaken_max", 1.3), "shaken_max")).all()
 
 
 def test_told_errors_are_as_large_as_what_finer_steps_change() -> None:

@@ -1,0 +1,237 @@
+"""The measured error of every rung of the ladder for some variants of a scene (pilots).
+
+A pilot climbs each column that can hold its tolerance at all until the error is small or no longer falls; from there
+on, finer rungs count as no worse.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.accuracy.grids import SceneGrid
+from engine.accuracy.jobs import InTurn, Job, Share
+from engine.accuracy.ladder import ENOUGH, Ladder, March, Rungs
+from engine.accuracy.reference import Converged, Level, as_fixed, converge, in_full, is_free
+from engine.kernels.schemes import Scheme
+from engine.march.outcome import vibration
+from engine.scene.variants import VariantValues
+from results_schema.arrays import Array, Counts
+
+# What is said of the next three was measured on `asymmetry`, `double-peak` and 10,000 passages: the work they took.
+#: Of the tolerance that a column leaves at such steps, so that none is climbed: 0.5 to 2 took 0.9 to 1.1 times.
+HOPELESS = 0.9
+MORE = 2.0  # times the fewest modes that leave little: with 1.4 some variants missed the tolerance, 4 gained nothing
+JUDGED_BY = 12  # modes, at least, of the column that says whether a simpler model can do at all: 6 to 24 took 0.8 to 1
+#: Of the tolerance, by a rung of the last scheme, for all pilots of a scene: dearer ones of other schemes are not
+#: climbed, as none would be taken. Of a gantry's pilots they took three quarters of the time.
+LEAVES = 0.5
+REFERENCE_PART = 0.25  # of the tolerance by which references may be off, which what they judge is told to be off too
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What P pilots found: error (M, R) of every result in each march of a pilot, the first infinite; pilot (M,): whose
+    it was; march (columns, cuts, P): the one that tells of a rung, 0 where none does; held (columns, cuts, P): the
+    largest of the errors that are held, without what the study itself fixes, over their tolerances; reference (R, P):
+    the errors of the references themselves; marched (columns, cuts): rungs that any has marched; work: modes x steps
+    over a passage or cycle of all their marches; spent (P,): the same of each one's reference; vibration (P,): of
+    cycles; free: whether the study fixes nothing that the references change."""
+
+    error: Array
+    pilot: Counts
+    march: NDArray[np.int32]
+    held: Array
+    reference: Array
+    marched: NDArray[np.bool_]
+    work: float
+    spent: Array
+    vibration: Array
+    free: bool
+
+
+@dataclass(eq=False)
+class Climb:
+    """Pilots of one scene on the ladder. span: the least and the largest `solver.tolerance` that a variant wants, over
+    the study's; ``values`` have the least. share: does marches that need not wait for each other."""
+
+    grid: SceneGrid
+    values: VariantValues
+    ladder: Ladder
+    share: Share = field(default_factory=InTurn)
+    span: tuple[float, float] = (1.0, 1.0)
+    rungs: Rungs = field(init=False)
+    found: list[tuple[Counts, Array]] = field(init=False)
+    held: Array = field(init=False)
+    march: NDArray[np.int32] = field(init=False)
+    marched: NDArray[np.bool_] = field(init=False)
+    work: float = 0.0
+    floor: dict[int, Array] = field(default_factory=dict)
+    enough: dict[str, Array] = field(default_factory=dict)
+
+    def go(self) -> Measured:
+        """Find the references of the pilots, what each model and number of modes can do for them, and with how many
+        steps. Raises Halted, and Crashed by the places of pilots."""
+        refer = partial(converge, self.grid, self.values, part=REFERENCE_PART, share=self.share)
+        levels = list[Level]()
+        aim = refer(levels=as_fixed(self.grid), seen=levels.append)
+        truth = aim if is_free(self.grid) else refer(levels=in_full(self.grid))
+        on_ladder = {self.ladder.columns.index(v.numerics): v for v in levels if v.numerics in self.ladder.columns}
+        self.rungs = Rungs(self.grid, self.values, self.ladder, self.span, truth, aim, on_ladder)
+        shape = len(self.ladder.columns), len(self.ladder.cuts), self.values.size
+        self.found = [(np.zeros(1, dtype=np.int64), np.full((1, len(truth.error)), np.inf))]
+        self.march = np.zeros(shape, dtype=np.int32)
+        self.held = np.full(shape, np.inf)
+        self.marched = np.zeros(shape[:2], dtype=np.bool_)
+        for name in dict.fromkeys(numerics.fidelity for numerics in self.ladder.columns):
+            self._judge(name)
+        for climbs in (self._to_higher_order, self._of_higher_order, self._further):
+            for marches in self.share(self.rungs, list(climbs())):
+                self._take(marches)
+        for name, enough in self.enough.items():
+            self._fill(name, enough)
+        return self._measured(truth, aim is truth)
+
+    def _measured(self, truth: Converged, free: bool) -> Measured:
+        """What the jobs found."""
+        work = float(self.work + truth.spent.sum())
+        pilot, error = (np.concatenate(parts) for parts in zip(*self.found, strict=True))
+        errors = error, pilot, self.march, self.held, truth.error, self.marched
+        return Measured(*errors, work, truth.spent, self._vibration(truth), free)
+
+    def _vibration(self, truth: Converged) -> Array:
+        """(P,) how much the pilots vibrate in a cycle; nothing of what is no cycle."""
+        if not self.grid.listens:
+            return np.zeros(self.values.size)
+        tables = self.grid.tables(self.grid.scene, 1)
+        return vibration(tables, self.values, self.grid.stations(self.grid.scene, 1), truth.outcome)
+
+    def _judge(self, name: str) -> None:
+        """What each number of modes of a model leaves, by the last scheme alone; from the fewest on, until some leave
+        so little that many more are of no use."""
+        own = [column for column, numerics in enumerate(self.ladder.columns) if numerics.fidelity == name]
+        everywhere = np.ones(self.values.size, dtype=np.bool_)
+        if name == "static" or len(self.ladder.cuts) == 1:
+            for column in own:
+                fits = self.rungs.least(column)[0] <= 1.0 if name != "static" else everywhere
+                self._march(column, {0: np.flatnonzero(fits)})
+            return
+        families: dict[int, list[int]] = {}
+        for column in own:
+            families.setdefault(self.ladder.columns[column].modes, []).append(column)
+        if name != self.grid.scene.numerics.fidelity:
+            modes = next((count for count in families if count >= JUDGED_BY), max(families))
+            everywhere = self._floor(families[modes][-1], everywhere) <= HOPELESS * self.span[1]
+        enough = np.full(self.values.size, np.inf)
+        for count, columns in families.items():
+            floor = self._floor(columns[-1], everywhere & (count <= MORE * enough))
+            enough = np.where((floor <= ENOUGH * self.span[0]) & ~np.isfinite(enough), count, enough)
+            self.floor |= dict.fromkeys(columns, floor)
+        self.enough[name] = enough
+
+    def _floor(self, column: int, fits: NDArray[np.bool_]) -> Array:
+        """(P,) what a column leaves with so many steps that its modes and its model alone do; infinite where these
+        would be more work than the reference."""
+        found = np.full(self.values.size, np.inf)
+        if not fits.any():
+            return found
+        cuts, fine, rungs = np.array(self.ladder.cuts), self.rungs.fine(column), self.rungs
+        known = fits & rungs.known(column)
+        if known.any():
+            self._take(rungs.marched(np.flatnonzero(known), column))
+        work = cuts[np.minimum(fine, cuts.size - 1)] * rungs.unit(column) * rungs.model(column).body_modes
+        fits = fits & (fine < cuts.size) & (work <= rungs.truth.used["work"])
+        lanes = np.flatnonzero(fits & ~known)
+        self._march(column, {int(rung): lanes[fine[lanes] == rung] for rung in np.unique(fine[lanes])[::-1]})
+        lanes = np.flatnonzero(fits | known)
+        found[lanes] = self.held[column, fine[lanes], lanes]
+        return found
+
+    def _pairs(self) -> dict[int, int]:
+        """Columns of a scheme beside which there is one of higher order, and that column."""
+        last = self.ladder.columns[-1].scheme
+        swift = {numerics: column for column, numerics in enumerate(self.ladder.columns) if numerics.scheme == last}
+        others = (column for column in self.floor if column not in swift.values())
+        return {column: swift[self.ladder.columns[column]._replace(scheme=last)] for column in others}
+
+    def _to_higher_order(self) -> Iterator[Job[list[March]]]:
+        """Climbs as far as where a scheme of higher order begins."""
+        for column, swift in self._pairs().items():
+            begins = self.rungs.work(swift)[np.minimum(self.rungs.first(swift), len(self.ladder.cuts) - 1)]
+            yield from self._climb(column, self.rungs.first(column), np.minimum(begins, self._least_work(column)))
+
+    def _of_higher_order(self) -> Iterator[Job[list[March]]]:
+        """Climbs by that, where the other one does not hold well before; where it does, that is no worse."""
+        plain = {swift: column for column, swift in self._pairs().items()}
+        for column in self.floor.keys() - plain.values():
+            start = self.rungs.first(column)
+            if column in plain:
+                well = self.held[plain[column]] <= ENOUGH * self.span[0]
+                before = well.any(axis=0) & (np.argmax(well, axis=0) <= start)
+                self._no_worse(column, plain[column], np.flatnonzero(before))
+                start = np.where(before, len(self.ladder.cuts), start)
+            yield from self._climb(column, start, np.full(start.size, np.inf))
+
+    def _further(self) -> Iterator[Job[list[March]]]:
+        """The first climbs from where they ended, as far as a scheme of higher order does not hold well for all pilots
+        with less work."""
+        for column in self._pairs():
+            told = self.march[column] > 0
+            start = len(told) - np.where(told.any(axis=0), np.argmax(told[::-1], axis=0), 0)
+            yield from self._climb(column, start, np.full(start.size, self._least_work(column)))
+
+    def _climb(self, column: int, start: Counts, most: Array) -> Iterator[Job[list[March]]]:
+        """Of a column, for pilots whose tolerance it can hold at all and to whom it is not dear from the start."""
+        floor, rungs = self.floor[column], np.minimum(start, len(self.ladder.cuts) - 1)
+        worth = (floor <= HOPELESS * self.span[1]) & (start < len(self.ladder.cuts))
+        lanes = np.flatnonzero(worth & (self.rungs.work(column)[rungs] <= most))
+        if lanes.size:
+            yield Job(partial(Rungs.climb, column=column, start=start, floor=floor, most=most), lanes)
+
+    def _least_work(self, column: int) -> float:
+        """Modes x steps of the cheapest marched rung of the same model by other schemes that holds well for all pilots;
+        infinite where none does."""
+        least, own = np.inf, self.ladder.columns[column]
+        for other, numerics in enumerate(self.ladder.columns):
+            if numerics.fidelity == own.fidelity and numerics.scheme != own.scheme:
+                holds = np.all(self.held[other] <= LEAVES * self.span[0], axis=1)
+                least = min(least, float(self.rungs.work(other)[holds].min(initial=np.inf)))
+        return least
+
+    def _march(self, column: int, pilots: Mapping[int, Counts]) -> None:
+        """March some pilots on each of some rungs."""
+        jobs = [Job(partial(Rungs.march, column=column, rung=rung), own) for rung, own in pilots.items() if own.size]
+        self._take(self.share(self.rungs, jobs))
+
+    def _take(self, marches: Iterable[March]) -> None:
+        """What marches found; of a column's, finer rungs are no worse."""
+        for column, rung, lanes, error, held, finer, work in marches:
+            numbers = sum(pilot.size for pilot, _ in self.found) + np.arange(lanes.size)
+            self.marched[column, rung] = True
+            self.held[column, rung:, lanes] = held[:, None]
+            self.march[column, rung:, lanes] = np.where(finer, numbers, 0)[:, None]
+            self.march[column, rung, lanes] = numbers
+            self.found.append((lanes, error.T))
+            self.work += work
+
+    def _fill(self, name: str, enough: Array) -> None:
+        """Pilots for which fewer modes were enough are no worse with more and the same steps, within their rules."""
+        before: dict[Scheme, int] = {}
+        for column, numerics in enumerate(self.ladder.columns):
+            if numerics.fidelity != name:
+                continue
+            lanes = np.flatnonzero((numerics.modes > enough) & ~np.isfinite(self.held[column]).any(axis=0))
+            if numerics.scheme in before:
+                self._no_worse(column, before[numerics.scheme], lanes)
+            before[numerics.scheme] = column
+
+    def _no_worse(self, column: int, other: int, lanes: Counts) -> None:
+        """Unknown rungs of a column that some pilots may take are no worse than those of another with as many steps."""
+        allowed = np.array(self.ladder.cuts)[:, None] >= self.rungs.least(column)[0][lanes]
+        rungs, own = np.nonzero(allowed & ~np.isfinite(self.held[column][:, lanes]))
+        for told in (self.held, self.march):
+            told[column, rungs, lanes[own]] = told[other, rungs, lanes[own]]
