@@ -81,7 +81,8 @@ class Sensor(Spec):
 
     With `under` or `carriage`, the body is that of the carriage and need not be named. tolerance: of its own, in place
     of `solver.tolerance`; "told": its error is told and makes no status, as for velocities, accelerations and contact
-    forces where nothing is given. frequency_limit: up to it modes count in a velocity or an acceleration.
+    forces where nothing is given. frequency_limit: up to it modes count in a velocity or an acceleration, which
+    converges then and is held.
     settling_band: within which of its static value a displacement has settled after a stop.
     """
 

@@ -37,6 +37,12 @@ def absolute_errors(results: Results, name: str, sensor: str = "") -> Array:
     )
 
 
+def errors_of_size(results: Results, sensor: str) -> Array:
+    """The estimated error of a sensor's largest absolute value, in its unit: that of the extreme which is larger."""
+    sides = [np.abs(results.everywhere(results.dataset[f"{sensor}_{side}"])) for side in ("max", "min")]
+    return np.where(sides[0] >= sides[1], *(absolute_errors(results, f"{sensor}_{side}") for side in ("max", "min")))
+
+
 def told_error(error: float, value: float, units: str) -> str:
     """What a value may be off, to stand behind it: "" where that is little of it, or not known."""
     return f" ± {quantity(error, units, 2)}" if error > LOOSE_PART * abs(value) else ""

@@ -14,6 +14,7 @@ from results_schema.arrays import Array, Mask
 from studies.findings.amplification import largest, sizes
 from studies.protocol.study import kind_named, question_of
 from studies.results.axes import PACES, VARIANT, Axis
+from studies.results.findings_common import LOOSE
 from studies.results.formatting import counted, listed, quantity
 from studies.results.results import Results
 
@@ -56,11 +57,18 @@ def limits_of(study: Study) -> Limits:
     return cast(Limits, question_of(study, kind.settings))
 
 
-def told_limit(results: Results, values: Array, limit: float, units: str, axis: Axis | None = None) -> str:
+def told_limit(
+    results: Results, values: Array, limit: float, units: str, axis: Axis | None = None, error: Array | float = 0.0
+) -> str:
     """In which part of the sweep largest absolute values (in its shape) exceed a limit: a sentence behind another;
-    along a swept number, the pace if none is given."""
-    said = where_beyond(results, values, limit, axis or results.axis(*PACES))
-    return f"{LIMIT}{quantity(limit, units)} {said}."
+    along a swept number, the pace if none is given. error: of the values, which may be too loose to say."""
+    along = axis or results.axis(*PACES)
+    said = where_beyond(results, values, limit, along)
+    loose = np.where(error > LOOSE * values, error, 0.0)
+    surely, perhaps = (where_beyond(results, values + sign * loose, limit, along) for sign in (-1.0, 1.0))
+    if surely == said == perhaps:
+        return f"{LIMIT}{quantity(limit, units)} {said}."
+    return f"{LIMIT}{quantity(limit, units)} {said}; with its estimated error perhaps {perhaps}, surely {surely}."
 
 
 def ranked(results: Results, limits: Limits, told: Collection[str] = ()) -> list[str]:

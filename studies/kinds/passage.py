@@ -10,7 +10,7 @@ from engine.scene.study import Study
 from results_schema.arrays import Array, Mask
 from results_schema.lazy_imports import xr
 from results_schema.variables import MARCH, declare
-from studies.findings.absolute_errors import absolute_errors, weight
+from studies.findings.absolute_errors import absolute_errors, errors_of_size, weight
 from studies.findings.amplification import (
     DYNAMIC_AMPLIFICATION,
     largest,
@@ -162,7 +162,10 @@ def _amplified_besides(results: Results, told: str) -> str:
 def _limited(results: Results, sensor: str) -> str:
     """Where a sensor is beyond what the question names for its quantity; "" where that names nothing."""
     limit = question_of(results.study, AskedOfPassages).limit(results.study.sensor[sensor].quantity)
-    return "" if limit is None else told_limit(results, sizes(results, sensor), limit, results.sensors[sensor])
+    if limit is None:
+        return ""
+    error = errors_of_size(results, sensor)
+    return told_limit(results, sizes(results, sensor), limit, results.sensors[sensor], error=error)
 
 
 def _with_remark(said: list[str], remark: str) -> list[str]:

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from results_schema.quantities import AFTER_STOP
+from studies.findings.absolute_errors import errors_of_size
 from studies.findings.amplification import sizes
 from studies.findings.beyond import limits_of, ranked, told_limit
 from studies.findings.effects import by_effect
@@ -68,7 +69,8 @@ def _sensors(results: Results) -> Iterator[str]:
         limit, beyond = limits.limit(results.study.sensor[sensor].quantity), ""
         if limit is not None:
             axis = next(iter(by_effect(results, largest)), None)
-            beyond = told_limit(results, np.asarray(largest), limit, results.sensors[sensor], axis)
+            error = errors_of_size(results, sensor)
+            beyond = told_limit(results, np.asarray(largest), limit, results.sensors[sensor], axis, error)
         if results.study.sensor[sensor].reads.of_arm:
             yield from _position_error(results, sensor, beyond)
             continue

@@ -166,6 +166,17 @@ def test_what_need_not_converge_is_told_only(quantity: str) -> None:
     assert [found[f"one_{end}"] for end in ("max", "min", "rms")] == pytest.approx([wanted] * 3, nan_ok=True)
 
 
+@pytest.mark.parametrize(("own", "wanted"), [({}, 2e-4), ({"tolerance": 1e-2}, 1e-2), ({"tolerance": "told"}, np.nan)])
+def test_rates_that_count_modes_up_to_a_limit_are_held(own: dict[str, Any], wanted: float) -> None:
+    """They converge, so that a limit of a question can be judged by them."""
+    limit = {"frequency_limit": 5.0}
+    one = fixed(0.4, "acceleration") | limit | own
+    line = {"body": "bed", "places": 5, "quantity": "velocity"} | limit
+    found = held(passages(sensor={"one": one}, envelope={"v": line}, solver={"tolerance": 2e-4}))
+    assert [found[f"one_{end}"] for end in ("max", "min", "rms")] == pytest.approx([wanted] * 3, nan_ok=True)
+    assert found["v_envelope_max"] == 2e-4
+
+
 def test_places_and_contact_forces_are_told_only() -> None:
     found = held(passages())
     told = {name for name, tolerance in found.items() if np.isnan(tolerance)}

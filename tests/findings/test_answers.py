@@ -257,6 +257,22 @@ def test_a_passage_tells_where_a_limit_of_the_question_is_exceeded() -> None:
     assert wanted in answers.answer(dataset)[0]
 
 
+def test_where_a_value_that_is_hardly_known_exceeds_a_limit_is_said_with_its_error() -> None:
+    """20 % of the true acceleration are 25 % of one that is as much too small."""
+    pace = 'pace = { of = "carriage.table.motion.speed", values = [1, 2, 3, 4] }'
+    sensor = '[sensor.shaken]\nbody = "bed"\nat = 5.0\nquantity = "acceleration"\n'
+    dataset = scenes.run("passage", pace, extra=f'{sensor}[question]\nacceleration = "3.4 m/s2"')
+    dataset["shaken_max"].values[:], dataset["shaken_min"].values[:] = [1.0, 2.0, 3.0, 4.0], -0.5
+    loose = scenes.with_errors(dataset, 0.2, "shaken_max", "shaken_min")
+    wanted = (
+        "Its absolute value exceeds 3.4 m/s² at 4 m/s; with its estimated error perhaps from 3 m/s to the end of the "
+        "sweep, 4 m/s, surely nowhere from 1 m/s to 4 m/s."
+    )
+    assert any(wanted in said for said in answers.answer(loose))
+    exact = answers.answer(scenes.with_errors(dataset, 1e-3, "shaken_max", "shaken_min"))
+    assert any("Its absolute value exceeds 3.4 m/s² at 4 m/s." in said for said in exact)
+
+
 def test_without_swept_speeds_variants_that_exceed_statics_are_counted() -> None:
     dataset = scenes.run("passage", 'mass = { of = "carriage.table.mass", values = [10, 600] }')
     dataset["dynamic_amplification"].loc[{"sensor": "midspan"}] = [1.0, 1.3]
