@@ -46,6 +46,15 @@ def _doubtful(plan: Plan) -> Iterator[str]:
             yield f"{said}; {doubt.meant(values) or 'is the unit right?'}"
 
 
+def _half_united(plan: Plan) -> Iterator[str]:
+    """Of lists alone: the ends of a range are refused."""
+    for name, axis in plan.study.sweep.axes.items():
+        unit = plan.study.unit(axis.of[0])
+        if unit is not None and (mixed := axis.half_united()):
+            united, bare = mixed
+            yield f'sweep.{name} lists {bare:g} without a unit beside "{united}": is {bare:g} {unit.typed} meant?'
+
+
 def _unsupported(plan: Plan) -> Iterator[str]:
     riding = {carriage.rides for carriage in plan.base.carriages}
     for number, part in enumerate(plan.base.bodies):
@@ -229,6 +238,7 @@ REMARKS: tuple[Callable[[Plan], Iterator[str]], ...]
 REMARKS = (
     _partly_inert,
     _doubtful,
+    _half_united,
     _unsupported,
     _released,
     _leaves_between,

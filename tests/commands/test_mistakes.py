@@ -38,6 +38,22 @@ MISTAKES = {
     "gravity below a sensor": (SMALL.replace("at = 0.5", "at = 0.5\ngravity = 9.81"), 2, ["at the top of the file"]),
     "scheme below sweep": (axis(SWEEP + 'scheme = "auto"'), 2, ["scheme is a key of [solver]"]),
     "an axis as a list": (axis("mass = [1, 2]"), 2, ["sweep.mass", "{ of = "]),
+    "an axis of one unit": (
+        axis('v = { of = "carriage.trolley.motion.speed", from = "2 km/h", to = 160, count = 3 }'),
+        2, ["sweep.v", '"2 km/h" and 160', "160 needs its unit too"],
+    ),
+    "a value without its unit": (
+        axis('m = { of = "carriage.trolley.mass", values = [1, "0.002 t"] }'),
+        0, ["sweep.m lists 1 with", "is 1 kg meant?"],
+    ),
+    "zero beside a unit": (axis('v = { of = "gravity", from = 0, to = "1 km/s^2", count = 2 }'), 0, ["0 to 1"]),
+    "random draws": (
+        axis('m = { of = "carriage.trolley.mass", random = 256, from = 1, to = 2 }'),
+        2, ["sweep.m.random", "sobol = N"],
+    ),
+    "percentiles as parts of one": (
+        f"{SMALL}\n[output]\npercentiles = [0.05, 0.5, 0.95]\n", 2, ["output", "0.05, 0.5, 0.95", "percent: 5, 50, 95"],
+    ),
     "an axis of half a key": (axis('v = { of = "speed", values = [1] }'), 2, ["carriage.trolley.motion.speed"]),
     "a key of another kind": (SMALL.replace("mass = 1.0\n", "mass = 1.0\nstiffness = 1e6\n"), 2, ['kind "oscillator"']),
     "a body without a name": (SMALL.replace("[body.beam]", "[body]"), 2, ["[body.NAME]"]),
