@@ -179,6 +179,12 @@ def test_what_looks_wrong_stands_before_all_tables(capsys: pytest.CaptureFixture
     assert message.index("Worth knowing\n- body beam is released") > message.index("Bodies")
 
 
+def test_no_file_is_proposed_for_its_ending_alone(capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ("59_cells.toml", "b.toml"):
+        Path(name).write_text(SMALL)
+    assert "did you mean" not in told(capsys, 2, "check", "a9.toml")
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
