@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from results_schema.status import Status, label
-from studies.commands.console import blank, heading, paragraphs, say, table
+from studies.commands.console import blank, heading, paragraphs, say, table, warn
 from studies.findings.numerics_used import is_marched, told_choices
 from studies.protocol.study import kind_named
 from studies.reporting.answers import answer_of
@@ -33,15 +33,26 @@ MOST_ROWS = 14  # of the table at the end of a run, which is to stay on the scre
 
 def show_preview(shown: Preview) -> None:
     """What `check` found: what looks wrong before all numbers that follow from it."""
-    doubts = [remark for remark in shown.remarks if "?" in remark]  # whether something is meant, as remarks ask it
+    doubts, others = _sorted(shown.remarks)
     if doubts:
         paragraphs("Is this meant?", *(f"- {remark}" for remark in doubts), "")
     for part in shown.tables:
         table(part.title, part.headings, part.rows)
     say(shown.cost)
-    others = [remark for remark in shown.remarks if remark not in doubts]
     if others:
         say("", "Worth knowing", *(f"- {remark}" for remark in others))
+
+
+def warn_of(remarks: Sequence[str]) -> None:
+    """The same of a run, on standard error."""
+    doubts, others = _sorted(remarks)
+    warn(*(f"is this meant? {remark}" for remark in doubts), *(f"worth knowing: {remark}" for remark in others))
+
+
+def _sorted(remarks: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Those that ask whether something is meant, and the others."""
+    doubts = [remark for remark in remarks if "?" in remark]
+    return doubts, [remark for remark in remarks if "?" not in remark]
 
 
 def show_studies(

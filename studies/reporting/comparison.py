@@ -72,7 +72,9 @@ def compare(first: Results, second: Results) -> Comparison:
             raise BadInput(what, where=one.study.title or one.study.kind, expected='output.keep = "all"')
     if first.dims != second.dims:
         what = "the archives have different axes, so there is nothing to compare"
-        raise BadInput(what, where=", ".join(second.dims) or "no axes", expected=", ".join(first.dims) or "no axes")
+        axes = [", ".join(one.dims) or "none" for one in (first, second)]
+        received = f"{axes[0]} in the first, {axes[1]} in the second"
+        raise BadInput(what, where="compare", expected="the same axes in both", received=received)
     mine, other = xr.align(first.dataset, second.dataset, join="inner", copy=False, exclude=_not_swept(first, second))
     both, own = Results(mine, first.study, first.models), Results(other, second.study, second.models)
     found, missing = _shared(both, own)

@@ -130,6 +130,7 @@ def test_compare_tells_what_differs(here: Path, capsys: Captured) -> None:
     assert "body.beam.damping_ratio" in shown and "midspan_max" in shown and "They differ" in shown
     assert "agree within" in output(capsys, "compare", "small.nc", "small.nc")
     assert main(["compare", "small.nc", "other.nc"]) == 2
+    assert "received speed, mass in the first, speed in the second" in capsys.readouterr().err
     apart = open_archive("finer.nc").root.midspan_max - open_archive("small.nc").root.midspan_max
     found = compare(results_of(open_archive("small.nc")), results_of(open_archive("finer.nc")))
     told = next(one for one in found.differences if one.name == "midspan_max")

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from results_schema.errors import BadInput
 from studies.commands.cli import main
 from tests.studies.small import SMALL
 
@@ -177,6 +178,16 @@ def test_what_looks_wrong_stands_before_all_tables(capsys: pytest.CaptureFixture
     assert message.startswith("Is this meant?\n- body.beam.density = 7.85 kg/m3")
     assert message.count("7.85 kg/m3") == 1
     assert message.index("Worth knowing\n- body beam is released") > message.index("Bodies")
+
+
+def test_a_run_asks_before_it_computes(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    def compute(*_: object) -> None:
+        assert "is this meant? body.beam.density = 7.85 kg/m3" in capsys.readouterr().err
+        raise BadInput("enough")
+
+    monkeypatch.setattr("studies.protocol.parts.Variants.compute", compute)
+    Path("study.toml").write_text(SMALL.replace("= 1000.0", "= 7.85"))
+    told(capsys, 2, "run", "study.toml")
 
 
 def test_no_file_is_proposed_for_its_ending_alone(capsys: pytest.CaptureFixture[str]) -> None:
