@@ -12,6 +12,7 @@ from engine.bodies.modal.modal_body import ModalBody
 from engine.model.lane_table import moving_mass, weight
 from engine.scene.study import Study
 from engine.scene.sweep import broken
+from engine.scene.variants import SpringKeys
 from engine.statics.directions import told_of
 from engine.study_file.refusals import value_at
 from results_schema.arrays import Array
@@ -25,11 +26,65 @@ DEEP = 0.1  # of the length: a static deflection beyond linear bending
 # to five times of it (those of built-in studies with 14 to 85 %), with a thousandth where kN were written as N. People
 # on footbridges and small tools are as light in truth: what is written with its unit is believed.
 LIGHT = 0.005
+SLOW = 0.1  # Hz, of a mass on its spring: vehicles swing at 0.5 to 20 Hz, and at a thirtieth of that on N/m for kN/m
 
 
 def remarks(plan: Plan) -> list[str]:
     """One sentence per remark, each once, in the order of `REMARKS`; none for an ordinary study."""
     return list(dict.fromkeys(sentence for remark in REMARKS for sentence in remark(plan)))
+
+
+def check_limits(plan: Plan) -> None:
+    """Refuse a frequency limit below every mode of its body in every variant. Raises BadInput."""
+    for key, (body, limits, first) in _limits(plan).items():
+        if (limits < first).all():
+            what = f"no mode of {body} has so low a frequency, so that this would read 0"
+            expected, received = f"at least its first natural frequency, {first.min():.4g} Hz", f"{limits.max():.4g} Hz"
+            raise plan.study.source.fault(f"{key}.frequency_limit", what, expected=expected, received=received)
+
+
+def sprung(plan: Plan) -> dict[str, tuple[Array, Array]]:
+    """Hz and damping ratios of masses on their springs, in all variants, by the tables that describe them."""
+    found: dict[str, list[tuple[Array, Array]]] = {}
+    for grid in plan.grids:
+        for name in (name for name, one in plan.study.carriage.items() if one.suspension is not None):
+            stiffness, damping, mass = map(grid.values.column, SpringKeys.of_carriage(name))
+            omega = np.sqrt(stiffness / mass)
+            table = plan.study.source.written(f"carriage.{name}")
+            found.setdefault(table, []).append((omega / (2.0 * np.pi), damping / (2.0 * mass * omega)))
+    return {table: (np.hstack([f for f, _ in own]), np.hstack([z for _, z in own])) for table, own in found.items()}
+
+
+def _slow(plan: Plan) -> Iterator[str]:
+    for table, (frequencies, _) in sprung(plan).items():
+        if frequencies.min() < SLOW and not _has_unit(plan.study, f"{table}.stiffness"):
+            yield (
+                f"the sprung mass of {table.replace('.', ' ')} swings at {frequencies.min():.2g} Hz on its spring: "
+                "were kilonewtons per metre meant?"
+            )
+
+
+def _silent(plan: Plan) -> Iterator[str]:
+    for key, (body, limits, first) in _limits(plan).items():
+        if (limits < first).any() and (limits >= first).any():
+            yield (
+                f"{key.replace('.', ' ')} reads 0 in some variants: the first frequency of {body}, up to "
+                f"{first.max():.4g} Hz, is above its frequency_limit there"
+            )
+
+
+def _limits(plan: Plan) -> dict[str, tuple[str, Array, Array]]:
+    """Sensors and envelopes with a frequency limit by their dotted keys: the body, and for each scene the limit and the
+    first natural frequency, Hz."""
+    found = {}
+    for table in ("sensor", "envelope"):
+        for name, reader in getattr(plan.study, table).items():
+            if reader.frequency_limit is not None:
+                own = [getattr(grid.scene.study, table)[name].frequency_limit for grid in plan.grids]
+                bodies = [part for grid in plan.grids for part in grid.scene.bodies if part.name == reader.body]
+                first = np.array([part.modal.omega[0] for part in bodies]) / (2.0 * np.pi)
+                found[f"{table}.{name}"] = reader.body, np.array(own), first
+    return found
 
 
 def _partly_inert(plan: Plan) -> Iterator[str]:
@@ -246,6 +301,8 @@ REMARKS = (
     _racing,
     _heavy,
     _light,
+    _slow,
+    _silent,
     _deep,
     _thin,
     _brief_rest,

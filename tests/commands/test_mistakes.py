@@ -32,6 +32,10 @@ MISTAKES = {
     "fibres in mm": (
         SMALL.replace("area =", "fibre_distance = 220\narea ="), 0, ["fibre_distance = 220 m", '"220 mm"'],
     ),
+    "a spring in kN/m": (
+        SMALL.replace('kind = "mass"', 'kind = "oscillator"\nstiffness = 0.2\ndamping = 0.04'),
+        0, ["trolley swings at 0.071 Hz", "kilonewtons per metre meant?", "0.0712 to 0.225 Hz  0.0447 to 0.141"],
+    ),
     "density in g/cm3": (SMALL.replace("= 1000.0", "= 7.85"), 0, ["density = 7.85", '"7.85 g/cm^3"']),
     "length in mm": (SMALL.replace("length = 1.0", "length = 15000"), 0, ["length = 15000 m", '"15000 mm"']),
     "a way in mm": (SMALL.replace("end = 1.0", "end = 1000"), 0, ["goes from 0 to 1000 m", "units"]),
