@@ -64,7 +64,8 @@ def _of_variants(parts: Variants, threads: int) -> Preview:
     plan = parts.plan
     seen = forecast(plan, threads)
     tables = (
-        *(_study(plan), _bodies(plan.base), *_checks(plan.base), _limits(plan.base), _sprung(plan)),
+        *(_study(plan), _bodies(plan.base), _tracks(plan.base), *_checks(plan.base)),
+        *(_limits(plan.base), _sprung(plan)),
         *(_sweep(plan.study, plan.cases), _ratios(plan)),
         *_in_step(plan),
         TextTable(seen.title, chosen.HEADINGS, seen.rows),
@@ -134,6 +135,7 @@ def _of_scene(study: Study, cases: Cases) -> Iterator[TextTable]:
     """The scene of a study that is computed in pieces, as a march's preview shows it."""
     base = base_scene(study)
     yield _bodies(base)
+    yield _tracks(base)
     yield from _checks(base)
     yield _sweep(study, cases)
 
@@ -182,6 +184,13 @@ def _bodies(base: SceneModel) -> TextTable:
         damping = f"{spanned(ratios)}{' without its dampers' * has_dampers(base.study, part.name)}"
         rows.append((part.name, f"{number(part.modal.mass, 5)} kg", str(omega.size), shown + more, damping))
     return TextTable("Bodies", ("body", "mass", "modes", "frequencies (Hz)", "damping ratio"), rows)
+
+
+def _tracks(base: SceneModel) -> TextTable:
+    """Which end of a track is its beginning, where nodes have names: its members may be listed either way."""
+    ends = {part.name: base.study.body[part.name].track_ends for part in base.bodies}
+    rows = [(name, *nodes, quantity(base.study.body[name].length, "m")) for name, nodes in ends.items() if nodes]
+    return TextTable("Tracks", ("body", "begins at node", "ends at node", "length"), rows)
 
 
 def _checks(base: SceneModel) -> Iterator[TextTable]:
