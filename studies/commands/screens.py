@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 BESIDE = ("_position", "_time", "_rms", "_used", "elapsed")  # endings of what `info` lists with --all alone
 LONGEST_LIST = 300  # letters
 MOST_ALIKE = 4  # results that are the same in every variant and told with their value
+TALLEST = 4  # lines of a row of that table
 MOST_ROWS = 14  # of the table at the end of a run, which is to stay on the screen
 
 
@@ -143,25 +144,23 @@ def show_details(outcome: Outcome) -> None:
 
 
 def _ranges(found: Sequence[Range], percentiles: Sequence[float]) -> None:
-    """Each result with its range, and the variant of the end of larger size; in a sentence those that do not change."""
-    axes = list(dict.fromkeys(name for one in found for name in one.extreme.words))
+    """Each result with its range, and where the end is that tells most; in a sentence those that do not change."""
     blank()
-    if not axes:
+    if not any(one.extreme.words for one in found):
         table("", ("result", "value"), [(_name(one), one.said(one.extreme)) for one in found])
         return
     parts = [f"{number(part)} %" for part in percentiles]
-    where = f"extreme at {', '.join(name.replace('_', ' ') for name in axes)}"
-    varied = [one for one in found if not one.is_constant]
     rows = [
         (
             _name(one),
             *(one.value(value) for value in (one.smallest.value, *one.percentiles, one.largest.value)),
-            ", ".join(one.extreme.words.values()),
+            f"{'largest' if one.telling is one.largest else 'smallest'} at {one.telling.where.replace('_', ' ')}",
         )
-        for one in varied
+        for one in found
+        if not one.is_constant
     ]
     if rows:
-        table("", ("result", "smallest", *parts, "largest", where), rows[:MOST_ROWS])
+        table("", ("result", "smallest", *parts, "largest", ""), rows[:MOST_ROWS], tallest=TALLEST)
     if rows[MOST_ROWS:]:
         paragraphs(f"{len(rows) - MOST_ROWS} more results: run -v, or the report.")
     same = [f"{_name(one)} {one.value(one.largest.value)}" for one in found if one.is_constant]

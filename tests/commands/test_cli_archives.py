@@ -48,6 +48,47 @@ def test_screens_fit_80_columns_and_speak_the_units_of_the_file(here: Path, caps
     assert "1.8 to 36 km/h" in output(capsys, "check", "small.toml")
 
 
+WIDE = (
+    SMALL[: SMALL.index("speed = {")]
+    + """
+speed = { of = "carriage.trolley.motion.speed", sobol = 8, from = "2 km/h", to = "36 km/h" }
+mass = { of = "carriage.trolley.mass", sobol = 8, from = 0.1, to = 1.0 }
+damping_ratio = { of = "body.beam.damping_ratio", sobol = 8, from = 0.01, to = 0.03 }
+gravity = { of = "gravity", sobol = 8, from = 9, to = 10 }
+
+[output]
+percentiles = [5, 50, 95]
+
+[solver]
+steps = 400
+audit = 0
+"""
+)
+
+
+def test_no_table_breaks_within_a_number_or_before_its_unit(here: Path, capsys: Captured) -> None:
+    """Where columns have no room each result is a block; which of its ends is where is told."""
+    write(here, WIDE)
+    write(here, WIDE.replace("modes = 4", "modes = 3"), "other.toml")
+    shown = output(capsys, "run", "small.toml", "-v")
+    assert main(["run", "other.toml"]) == 0
+    compared = output(capsys, "compare", "small.nc", "other.nc")
+    assert all(len(line) <= 80 for line in (shown + compared).splitlines())
+    results = results_of(open_archive("small.nc"))
+    for one in summary.in_tables(results):
+        values = (one.smallest.value, *one.percentiles, one.largest.value)
+        assert one.is_constant or all(f" {one.value(value)}" in shown for value in values)
+        assert one.is_constant or f"{one.name} {one.sensor}".strip() in shown.splitlines()
+    for found in compare(results, results_of(open_archive("other.nc"))).differences:
+        assert all(quantity(value, found.units) in compared for value in (*found.values, *found.extremes))
+    blocks = shown[shown.index("\ntrolley_contact_force_min\n") :].split("\n  ")
+    lowest = float(results.dataset.trolley_contact_force_min.min())
+    [low] = [one for one in summary.in_tables(results) if one.name == "trolley_contact_force_min"]
+    assert low.telling.value == lowest and blocks[2].startswith(f"smallest at speed {low.telling.words['speed']}")
+    [high] = [one for one in summary.in_tables(results) if one.name == "midspan_max"]
+    assert high.telling.value == float(results.dataset.midspan_max.max())
+
+
 def test_forces_that_press_as_they_are_written_stand_in_no_table(here: Path, capsys: Captured) -> None:
     """But in the archive; what is the same everywhere has one line."""
     train = "[train.tram]\non = 'beam'\nkind = 'force'\nforce = 2.0\nspacing = [0.2]\n"
