@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from results_schema.status import Status, label
@@ -11,8 +12,9 @@ from studies.commands.console import blank, heading, paragraphs, say, table, war
 from studies.findings.numerics_used import is_marched, told_choices
 from studies.protocol.study import kind_named
 from studies.reporting.answers import answer_of
+from studies.results.cells import percentile_spans
 from studies.results.findings_common import missed_most, remedy
-from studies.results.formatting import counted, listed, number, quantity
+from studies.results.formatting import counted, listed, number, quantity, spanned
 from studies.results.results import Results
 from studies.runs.audit import told_accuracy, told_audit
 
@@ -122,6 +124,7 @@ def show_outcome(outcome: Outcome) -> None:
     paragraphs(*answer_of(results))
     if not summary.is_measured(outcome.results):  # the grid of those that measure is of methods: its ends say nothing
         _ranges(summary.in_tables(results), results.percentiles)
+        _percentiles(results, [_name(one) for one in summary.in_tables(results)][:MOST_ROWS])
     accuracy = told_accuracy(outcome.audit, results)
     paragraphs(*_about_statuses(results), *([f"Accuracy: {accuracy}"] if accuracy else []))
     paragraphs(f"{_about_work(outcome)}. Next: wanderlast report {outcome.archive}")
@@ -170,6 +173,18 @@ def _ranges(found: Sequence[Range], percentiles: Sequence[float]) -> None:
     loose = [f"{_name(one)} {one.said(one.extreme)}" for one in found if one.is_loose]
     if loose:
         paragraphs(f"By their told errors hardly known: {', '.join(loose)}.")
+
+
+def _percentiles(results: Results, shown: Sequence[str]) -> None:
+    """Of an archive of several cells, in which each has its own."""
+    found = {name: (units, values) for name, units, values in percentile_spans(results) if name in shown}
+    rows = [
+        (name, *(spanned(span, partial(quantity, units=units)) for span in values.T))
+        for name, (units, values) in sorted(found.items(), key=lambda one: shown.index(one[0]))
+    ]
+    if rows:
+        parts = [f"{number(part)} %" for part in results.study.output.percentiles]
+        table(f"Percentiles of {counted(results.size, 'cell')}, from one to another", ("result", *parts), rows)
 
 
 def _name(found: Range) -> str:
