@@ -24,7 +24,9 @@ from results_schema.store.archive import open_archive
 from studies.commands.cli import main as command
 from studies.protocol.parts import Memory, Variants, Work
 from studies.protocol.study import kind_of
+from studies.reporting.tabulated import table_of
 from studies.results.formatting import quantity
+from studies.results.results import Results
 from tests.studies.every_way import assert_same_archives
 from tests.studies.small import SEPARATED
 
@@ -211,6 +213,7 @@ def test_every_command_reads_archives_of_cells(here: Path, capsys: pytest.Captur
     assert command(["export", "a.nc", "a.csv"]) == 0
     rows = Path("a.csv").read_text(encoding="utf-8").splitlines()
     assert len(rows) == 1 + 3 * open_archive("a.nc").root.sizes["result"] and "smallest_at mass" in rows[0]
+    assert "smallest_at speed (m s-1),smallest_at mass (kg),smallest_at damping,largest" in rows[0]
     capsys.readouterr()
     assert command(["compare", "a.nc", "a.nc"]) == 2
     assert "no variants to compare" in capsys.readouterr().err
@@ -234,6 +237,14 @@ def test_what_cells_cannot_hold_is_refused(text: str, where: str) -> None:
     with pytest.raises(BadInput) as caught:
         studies.run(engine.load(text))
     assert caught.value.where == where or caught.value.where.endswith(f": {where}")
+
+
+def test_tables_have_one_unit_for_a_swept_number(tmp_path: Path) -> None:
+    text = TEXT.replace("[1.0, 4.0, 9.0]", '["3.6 km/h", "14.4 km/h"]').replace("sobol = 300", "sobol = 8")
+    found = studies.run(engine.load(text + KEPT["extremes"]))
+    table, _ = table_of(Results.of(found))
+    np.testing.assert_array_equal(table["largest_at speed (km/h)"], table["speed (km/h)"])
+    np.testing.assert_array_equal(table["largest_at mass (kg)"], found["largest_at"].sel(swept="mass").values.ravel())
 
 
 @pytest.mark.parametrize("kept", ["percentiles", "one cell"])
