@@ -196,6 +196,8 @@ def show_comparison(found: Comparison) -> None:
     changes = [(change.key, _value(change.first), _value(change.second)) for change in found.changes]
     if changes:
         table("The studies differ", ("key", "first", "second"), changes)
+    if found.programs:
+        paragraphs(f"Made by different states of the program: {listed(found.programs)}.")
     only = f"; {found.only_first:,} only in the first, {found.only_second:,} only in the second"
     alone = only if found.only_first or found.only_second else ""
     paragraphs(f"{counted(found.variants, 'variant')} in both{alone}.")

@@ -4,6 +4,7 @@ import csv
 import json
 import re
 import tomllib
+from importlib.metadata import version
 from pathlib import Path
 
 import jsonschema
@@ -15,11 +16,13 @@ import studies
 from results_schema.store.archive import open_archive
 from studies.commands import catalogue
 from studies.commands.cli import main
+from studies.commands.screens import show_comparison
 from studies.reporting import summary
 from studies.reporting.comparison import compare
 from studies.results.formatting import quantity
 from studies.results.results import Results
 from studies.runs.archived import results_of
+from studies.runs.identity import sources, sources_hash
 from tests.studies.small import SEPARATED, SMALL, write
 
 Captured = pytest.CaptureFixture[str]
@@ -177,6 +180,21 @@ def test_compare_tells_what_differs(here: Path, capsys: Captured) -> None:
     told = next(one for one in found.differences if one.name == "midspan_max")
     assert abs(told.largest) == pytest.approx(float(abs(apart).max()), rel=1e-12)
     assert [(change.key, change.first, change.second) for change in found.changes] == [("body.beam.modes", 4, 5)]
+
+
+def test_compare_tells_other_states_of_the_program(here: Path, capsys: Captured) -> None:
+    write(here)
+    assert main(["run", "small.toml"]) == 0
+    made = results_of(open_archive("small.nc"))
+    other = Results(made.dataset.assign_attrs(sources="0123456789ab"), made.study, made.models)
+    assert compare(made, made).programs == ()
+    found = compare(other, made)
+    own = f"wanderlast {version('wanderlast')}, sources "
+    assert found.programs == (f"{own}0123456789ab", own + sources_hash(sources())[:12]) and found.agree
+    show_comparison(found)
+    assert f"Made by different states of the program: {own}0123456789ab and" in " ".join(
+        capsys.readouterr().out.split()
+    )
 
 
 def test_compare_shows_both_values_where_they_differ_most_and_both_of_largest_size(
