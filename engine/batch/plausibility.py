@@ -16,6 +16,7 @@ from engine.scene.variants import SpringKeys
 from engine.statics.directions import told_of
 from engine.study_file.refusals import value_at
 from results_schema.arrays import Array
+from results_schema.quantities import QUANTITIES
 
 FAST = 3.0  # times the critical speed
 RACING = 150.0  # m/s: trains have run at 160, machines at 10; km/h read as m/s begin with 200
@@ -26,6 +27,7 @@ DEEP = 0.1  # of the length: a static deflection beyond linear bending
 # to five times of it (those of built-in studies with 14 to 85 %), with a thousandth where kN were written as N. People
 # on footbridges and small tools are as light in truth: what is written with its unit is believed.
 LIGHT = 0.005
+SAME_PLACE = 1e-9  # of a length: nearer places are one
 SLOW = 0.1  # Hz, of a mass on its spring: vehicles swing at 0.5 to 20 Hz, and at a thirtieth of that on N/m for kN/m
 
 
@@ -70,6 +72,22 @@ def _silent(plan: Plan) -> Iterator[str]:
             yield (
                 f"{key.replace('.', ' ')} reads 0 in some variants: the first frequency of {body}, up to "
                 f"{first.max():.4g} Hz, is above its frequency_limit there"
+            )
+
+
+def _between_places(plan: Plan) -> Iterator[str]:
+    """Of envelopes of what has its peaks over supports and at ends of members; of the scene without sweep."""
+    bodies = {part.name: part.modal for part in plan.base.bodies}
+    for name, envelope in plan.study.envelope.items():
+        body = bodies[envelope.body]
+        places = envelope.along(body.length)
+        joints = [at for at in body.joints if places[0] < at < places[-1]]
+        off = [at for at in joints if np.abs(places - at).min() > SAME_PLACE * body.length]
+        if off and len(joints) < envelope.places and QUANTITIES[envelope.quantity].has_kinks:
+            more = f", and {len(off) - 1} more," if len(off) > 1 else ""
+            yield (
+                f"no place of envelope {name} is at {off[0]:.6g} m of {envelope.body}{more} where {envelope.quantity} "
+                "has a kink (a support, or the end of a member): a sensor there reads the peak, or other places"
             )
 
 
@@ -303,6 +321,7 @@ REMARKS = (
     _light,
     _slow,
     _silent,
+    _between_places,
     _deep,
     _thin,
     _brief_rest,

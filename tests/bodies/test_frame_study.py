@@ -7,6 +7,8 @@ import pytest
 
 import engine
 import engine.batch.plan
+from engine.batch.plan import make_plan
+from engine.batch.plausibility import remarks
 from engine.bodies.build import build_body
 from engine.bodies.frame.frame import Frame
 from engine.scene.study import Study, load
@@ -335,3 +337,14 @@ def test_check_tells_where_a_track_begins(members: list[str], ends: tuple[str, s
 def test_a_track_of_one_member_runs_as_its_nodes_do() -> None:
     alone = Study(**STUDY | {"body": {"bridge": BRIDGE | {"track": {"members": ["right"]}}}})
     assert alone.body["bridge"].track_ends == ("c", "b")
+
+
+@pytest.mark.parametrize(("places", "quantity"), [(6, "bending_moment"), (5, "bending_moment"), (6, "displacement")])
+def test_envelopes_that_pass_over_the_end_of_a_member_are_told(places: int, quantity: str) -> None:
+    """Of what has a kink there; of six places of 8 m none is in the middle."""
+    envelope = {"deck": {"body": "bridge", "quantity": quantity, "places": places}}
+    given = Study(**STUDY | {"envelope": envelope, "solver": {"steps": 2000, "audit": 0}})
+    told = [
+        text for text in remarks(make_plan(given)) if text.startswith("no place of envelope deck is at 4 m of bridge")
+    ]
+    assert len(told) == (places == 6 and quantity == "bending_moment")
