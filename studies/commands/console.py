@@ -73,10 +73,10 @@ def say_json(content: Mapping[str, Any]) -> None:
 
 
 def paragraphs(*texts: str) -> None:
-    """Print sentences, wrapped between words, with nothing between them but line breaks."""
+    """Print sentences, wrapped as cells of tables are, with nothing between them but line breaks."""
     console = _output()
-    for text in texts:
-        console.print(Text(printable(text, 10_000)))
+    for line in (line for text in texts for line in _wrapped(printable(text, 10_000), console.width)):
+        console.print(Text(line), soft_wrap=True)
 
 
 def table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]], tallest: int = LONGEST_CELL) -> None:

@@ -77,6 +77,7 @@ def test_no_table_breaks_within_a_number_or_before_its_unit(here: Path, capsys: 
     assert main(["run", "other.toml"]) == 0
     compared = output(capsys, "compare", "small.nc", "other.nc")
     assert all(len(line) <= 80 for line in (shown + compared).splitlines())
+    assert not re.search(r"\d *\n *(m|mm|µm|N|kN|m/s²|km/h|kg|%|s|Hz)\b", shown + compared)
     results = results_of(open_archive("small.nc"))
     for one in summary.in_tables(results):
         values = (one.smallest.value, *one.percentiles, one.largest.value)
