@@ -35,7 +35,8 @@ SECONDS_PER_LINE = 30.0  # of what a run tells where no terminal shows a bar: te
 
 _NUMBER = re.compile(r"-?[\d.,e-]+( [^\s\d]\S*)*")
 _UNIT = r"[^\s\d±=]\S*( (?:m|s|kg)(?:/\S+|[²³⁴])?[,;.)]?(?!\S))?"  # a word, and what follows N in N m
-_PIECE = re.compile(rf"(?:± )?\(?-?\d[\d.,e-]*(?<!,)( {_UNIT})?(?!\S)|\S+")
+_SYMBOL = r"[A-Za-z]+(?: (?:m|s|kg|rad)-?\d)+(?!\S)|N m(?!\S)"  # of an archive, such as m s-2
+_PIECE = re.compile(rf"(?:± )?\(?-?\d[\d.,e-]*(?<!,)( {_UNIT})?(?!\S)|{_SYMBOL}|\S+")
 
 
 class _Output(Console):
@@ -119,6 +120,8 @@ def _pieces(text: str) -> list[str]:
 
     >>> _pieces("-2.5 kN m ± 15 N m at 139 km/h, variant 21")
     ['-2.5 kN m', '± 15 N m', 'at', '139 km/h,', 'variant', '21']
+    >>> _pieces("m s-2 or N m")
+    ['m s-2', 'or', 'N m']
     """
     return [found[0] for found in _PIECE.finditer(text)]
 
