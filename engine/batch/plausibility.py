@@ -46,15 +46,19 @@ def check_limits(plan: Plan) -> None:
 
 
 def sprung(plan: Plan) -> dict[str, tuple[Array, Array]]:
-    """Hz and damping ratios of masses on their springs, in all variants, by the tables that describe them."""
-    found: dict[str, list[tuple[Array, Array]]] = {}
+    """The smallest and largest natural frequencies (Hz) and damping ratios of masses on their springs, of each scene,
+    by the tables that describe them."""
+    found: dict[str, list[list[float]]] = {}
     for grid in plan.grids:
         for name in (name for name, one in plan.study.carriage.items() if one.suspension is not None):
-            stiffness, damping, mass = map(grid.values.column, SpringKeys.of_carriage(name))
+            keys = SpringKeys.of_carriage(name)
+            own = (grid.values.columns.get(key, grid.values.study.value(key)) for key in keys)  # few are swept
+            stiffness, damping, mass = map(np.asarray, own)
             omega = np.sqrt(stiffness / mass)
-            table = plan.study.source.written(f"carriage.{name}")
-            found.setdefault(table, []).append((omega / (2.0 * np.pi), damping / (2.0 * mass * omega)))
-    return {table: (np.hstack([f for f, _ in own]), np.hstack([z for _, z in own])) for table, own in found.items()}
+            parts = omega / (2.0 * np.pi), damping / (2.0 * mass * omega)
+            ends = [end() for part in parts for end in (part.min, part.max)]
+            found.setdefault(plan.study.source.written(f"carriage.{name}"), []).append(ends)
+    return {table: (np.array(own)[:, :2], np.array(own)[:, 2:]) for table, own in found.items()}
 
 
 def _slow(plan: Plan) -> Iterator[str]:

@@ -217,7 +217,7 @@ def _limits(base: SceneModel) -> TextTable:
 def _sprung(plan: Plan) -> TextTable:
     """Masses on their springs, as if these stood on the ground."""
     rows = [
-        (table.partition(".")[2], f"{spanned(frequencies)} Hz", spanned(ratios))
+        (table.partition(".")[2], f"{spanned(frequencies.ravel())} Hz", spanned(ratios.ravel()))
         for table, (frequencies, ratios) in sprung(plan).items()
     ]
     return TextTable("Sprung masses by themselves", ("carriage", "natural frequency", "damping ratio"), rows)
