@@ -41,5 +41,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """What completion offers: names that are not imported yet, too."""
-    return sorted({*globals(), *__all__})
+    """What completion offers: the public names, imported or not, and none of their helpers."""
+    return sorted([*__all__, *(name for name in globals() if name.startswith("__"))])

@@ -33,6 +33,15 @@ def test_a_study_file_is_run_by_its_path(run: Any, tmp_path: Path) -> None:
     assert "cannot be read" in refused(run, tmp_path / "none.toml")
 
 
+@pytest.mark.parametrize("run", RUNS)
+def test_an_archive_is_no_study(run: Any, tmp_path: Path) -> None:
+    """However large it is."""
+    path = tmp_path / "found.nc"
+    path.write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(11_000_000))
+    said = refused(run, path)
+    assert "an archive of results, not a study" in said and "xarray.open_dataset(" in said
+
+
 @pytest.mark.parametrize("call", [*RUNS, engine.Study])
 def test_tables_are_no_study(call: Any) -> None:
     said = refused(call, {"kind": "passage"})
@@ -59,6 +68,7 @@ def test_what_is_often_a_mistake_is_a_warning(run: Any, category: type[Warning])
 @pytest.mark.parametrize("package", [engine, studies])
 def test_public_names_are_completed(package: Any) -> None:
     assert set(package.__all__) <= set(dir(package))
+    assert not [name for name in dir(package) if not name.startswith("__") and name not in package.__all__]
     package.__dict__.pop("run", None)
     assert "run" in dir(package) and "__doc__" in dir(package)
 

@@ -12,9 +12,11 @@ from engine.bodies.modal.modal_body import ModalBody
 from engine.model.lane_table import moving_mass, weight
 from engine.scene.study import Study
 from engine.scene.sweep import broken
+from engine.scene.variants import SpringKeys
 from engine.statics.directions import told_of
 from engine.study_file.refusals import value_at
 from results_schema.arrays import Array
+from results_schema.quantities import QUANTITIES
 
 FAST = 3.0  # times the critical speed
 RACING = 150.0  # m/s: trains have run at 160, machines at 10; km/h read as m/s begin with 200
@@ -25,11 +27,86 @@ DEEP = 0.1  # of the length: a static deflection beyond linear bending
 # to five times of it (those of built-in studies with 14 to 85 %), with a thousandth where kN were written as N. People
 # on footbridges and small tools are as light in truth: what is written with its unit is believed.
 LIGHT = 0.005
+SAME_PLACE = 1e-9  # of a length: nearer places are one
+SLOW = 0.1  # Hz, of a mass on its spring: vehicles swing at 0.5 to 20 Hz, and at a thirtieth of that on N/m for kN/m
 
 
 def remarks(plan: Plan) -> list[str]:
     """One sentence per remark, each once, in the order of `REMARKS`; none for an ordinary study."""
     return list(dict.fromkeys(sentence for remark in REMARKS for sentence in remark(plan)))
+
+
+def check_limits(plan: Plan) -> None:
+    """Refuse a frequency limit below every mode of its body in every variant. Raises BadInput."""
+    for key, (body, limits, first) in _limits(plan).items():
+        if (limits < first).all():
+            what = f"no mode of {body} has so low a frequency, so that this would read 0"
+            expected, received = f"at least its first natural frequency, {first.min():.4g} Hz", f"{limits.max():.4g} Hz"
+            raise plan.study.source.fault(f"{key}.frequency_limit", what, expected=expected, received=received)
+
+
+def sprung(plan: Plan) -> dict[str, tuple[Array, Array]]:
+    """The smallest and largest natural frequencies (Hz) and damping ratios of masses on their springs, of each scene,
+    by the tables that describe them."""
+    found: dict[str, list[list[float]]] = {}
+    for grid in plan.grids:
+        for name in (name for name, one in plan.study.carriage.items() if one.suspension is not None):
+            keys = SpringKeys.of_carriage(name)
+            own = (grid.values.columns.get(key, grid.values.study.value(key)) for key in keys)  # few are swept
+            stiffness, damping, mass = map(np.asarray, own)
+            omega = np.sqrt(stiffness / mass)
+            parts = omega / (2.0 * np.pi), damping / (2.0 * mass * omega)
+            ends = [end() for part in parts for end in (part.min, part.max)]
+            found.setdefault(plan.study.source.written(f"carriage.{name}"), []).append(ends)
+    return {table: (np.array(own)[:, :2], np.array(own)[:, 2:]) for table, own in found.items()}
+
+
+def _slow(plan: Plan) -> Iterator[str]:
+    for table, (frequencies, _) in sprung(plan).items():
+        if frequencies.min() < SLOW and not _has_unit(plan.study, f"{table}.stiffness"):
+            yield (
+                f"the sprung mass of {table.replace('.', ' ')} swings at {frequencies.min():.2g} Hz on its spring: "
+                "were kilonewtons per metre meant?"
+            )
+
+
+def _silent(plan: Plan) -> Iterator[str]:
+    for key, (body, limits, first) in _limits(plan).items():
+        if (limits < first).any() and (limits >= first).any():
+            yield (
+                f"{key.replace('.', ' ')} reads 0 in some variants: the first frequency of {body}, up to "
+                f"{first.max():.4g} Hz, is above its frequency_limit there"
+            )
+
+
+def _between_places(plan: Plan) -> Iterator[str]:
+    """Of envelopes of what has its peaks over supports and at ends of members; of the scene without sweep."""
+    bodies = {part.name: part.modal for part in plan.base.bodies}
+    for name, envelope in plan.study.envelope.items():
+        body = bodies[envelope.body]
+        places = envelope.along(body.length)
+        joints = [at for at in body.joints if places[0] < at < places[-1]]
+        off = [at for at in joints if np.abs(places - at).min() > SAME_PLACE * body.length]
+        if off and len(joints) < envelope.places and QUANTITIES[envelope.quantity].has_kinks:
+            more = f", and {len(off) - 1} more," if len(off) > 1 else ""
+            yield (
+                f"no place of envelope {name} is at {off[0]:.6g} m of {envelope.body}{more} where {envelope.quantity} "
+                "has a kink (a support, or the end of a member): a sensor there reads the peak, or other places"
+            )
+
+
+def _limits(plan: Plan) -> dict[str, tuple[str, Array, Array]]:
+    """Sensors and envelopes with a frequency limit by their dotted keys: the body, and for each scene the limit and the
+    first natural frequency, Hz."""
+    found = {}
+    for table in ("sensor", "envelope"):
+        for name, reader in getattr(plan.study, table).items():
+            if reader.frequency_limit is not None:
+                own = [getattr(grid.scene.study, table)[name].frequency_limit for grid in plan.grids]
+                bodies = [part for grid in plan.grids for part in grid.scene.bodies if part.name == reader.body]
+                first = np.array([part.modal.omega[0] for part in bodies]) / (2.0 * np.pi)
+                found[f"{table}.{name}"] = reader.body, np.array(own), first
+    return found
 
 
 def _partly_inert(plan: Plan) -> Iterator[str]:
@@ -44,6 +121,15 @@ def _doubtful(plan: Plan) -> Iterator[str]:
             values = found[0]
             said = f"{doubt.where} = {doubt.amount(values)}: {doubt.what}, expected {doubt.expected}"
             yield f"{said}; {doubt.meant(values) or 'is the unit right?'}"
+
+
+def _half_united(plan: Plan) -> Iterator[str]:
+    """Of lists alone: the ends of a range are refused."""
+    for name, axis in plan.study.sweep.axes.items():
+        unit = plan.study.unit(axis.of[0])
+        if unit is not None and (mixed := axis.half_united()):
+            united, bare = mixed
+            yield f'sweep.{name} lists {bare:g} without a unit beside "{united}": is {bare:g} {unit.typed} meant?'
 
 
 def _unsupported(plan: Plan) -> Iterator[str]:
@@ -229,6 +315,7 @@ REMARKS: tuple[Callable[[Plan], Iterator[str]], ...]
 REMARKS = (
     _partly_inert,
     _doubtful,
+    _half_united,
     _unsupported,
     _released,
     _leaves_between,
@@ -236,6 +323,9 @@ REMARKS = (
     _racing,
     _heavy,
     _light,
+    _slow,
+    _silent,
+    _between_places,
     _deep,
     _thin,
     _brief_rest,

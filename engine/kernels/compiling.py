@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-WORDS = "compiling kernels for this machine, once: about half a minute"
+WORDS = "compiling kernels for this kind of scene, once on this machine: up to half a minute"
 
 
 @contextmanager

@@ -117,6 +117,7 @@ def check_targets(study: Study, name: str, axis: SweepAxis) -> None:
             remedy = nearest(longer[0], longer) if longer else nearest(path, known)
             if several := fnmatch.filter(known, path) if "*" in path else []:
                 remedy = f"name each of them: of = {json.dumps(several[:3])}{' and so on' * (len(several) > 3)}"
+            remedy = _of_list(study, path) or remedy
             what = "no such number"
             raise study.source.fault(
                 here, what, expected="the key of a number", received=shortened(path), remedy=remedy
@@ -132,6 +133,19 @@ def check_targets(study: Study, name: str, axis: SweepAxis) -> None:
                 received=shortened(path),
                 remedy="a study file for each",
             )
+
+
+def _of_list(study: Study, path: str) -> str:
+    """How a list is swept: each of its numbers by its own key, and those of a train's loads by their scale; "" where
+    there is none at this key."""
+    own = [key for key in study.numbers() if key.startswith(f"{path}.") and key[len(path) + 1 :].isdigit()]
+    if not own:
+        return ""
+    table, name, key = (*path.split(".", 2), "", "")[:3]
+    several = f"{json.dumps(own[0])} to {json.dumps(own[-1])}" if len(own) > 1 else json.dumps(own[0])
+    scaled = table == "train" and key in study.train[name].loads
+    together = f'; "{table}.{name}.load_scale" multiplies all of them' if scaled else ""
+    return f"this is a list, and of takes its numbers, {several}{together}"
 
 
 def _axle_that_would_leave(study: Study, path: str) -> str:

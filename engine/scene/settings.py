@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import isfinite
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, PlainValidator, Tag, model_validator
 
@@ -110,6 +111,13 @@ class Output(Spec):
         return self.keep == "all"
 
     @model_validator(mode="after")
+    def _in_percent(self) -> Output:
+        if len(self.percentiles) > 1 and max(self.percentiles) <= 1:
+            received, remedy = shortened(self.percentiles), "percent: 5, 50, 95"
+            raise fault("percentiles as parts of one", expected="per cent", received=received, remedy=remedy)
+        return self
+
+    @model_validator(mode="after")
     def _fitting_keys(self) -> Output:
         if self.keeps_variants and self.cells is not None:
             raise fault("cells: for archives that reduce variants", expected='keep = "extremes" or "percentiles"')
@@ -146,11 +154,19 @@ Paths = Annotated[
 ]
 
 
+DRAWN = "sobol = N draws N values between from and to"
+
+
 class SweepAxis(Spec):
     """One varied number, or several that vary together: listed values, a range, or a sample of a range.
 
     of: dotted key or keys, all of which get the same value. sobol: size of the sample (scrambled, seed 0).
     """
+
+    looked_for: ClassVar[Mapping[str, str]] = {
+        **dict.fromkeys(("random", "samples", "sample", "draws", "lhs", "monte_carlo"), DRAWN),
+        **dict.fromkeys(("n", "num", "number", "points", "steps", "step"), "count = N: values between from and to"),
+    }
 
     of: Paths
     values: Amounts | None = None
@@ -185,6 +201,22 @@ class SweepAxis(Spec):
         if forms != ["values"] and len(ranged) < 2:
             raise fault(f"{forms[0]} needs from and to", expected="from = ..., to = ...")
         return self
+
+    @model_validator(mode="after")
+    def _ends_in_one_unit(self) -> SweepAxis:
+        if not self.values and (mixed := self.half_united()):  # 160 beside "2 km/h" would be 160 m/s
+            what, expected = "a number without a unit beside one with a unit", "both with their units, or none"
+            received, remedy = f"{shortened(mixed[0])} and {mixed[1]}", f"{mixed[1]} needs its unit too"
+            raise fault(what, expected=expected, received=received, remedy=remedy)
+        return self
+
+    def half_united(self) -> tuple[str, float] | None:
+        """The first of its numbers with a unit and the first without one, where it has both; 0 is 0 in any unit."""
+        amounts = [amount for amount in (self.values or (self.from_, self.to)) if amount]
+        united = [amount for amount in amounts if isinstance(amount, str)]
+        if len(united) in (0, len(amounts)):
+            return None
+        return united[0], next(amount for amount in amounts if not isinstance(amount, str))
 
 
 class Sweep(Spec):

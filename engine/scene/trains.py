@@ -153,8 +153,10 @@ class Train(Spec):
             raise fault("spacings lie between axles", expected=expected, received=f"axles = {self.axles}")
         for key in self.each:
             if len(self.own(key)) != self.count:
-                what, received = f"{key} is one number, or one for each axle", f"{len(self.own(key))} numbers"
-                raise fault(what, expected=f"{self.count} numbers, or one", received=received)
+                count = len(self.own(key))
+                what = f"{key} is one number for all axles, or a list with one for each"
+                received = f"a list of {count} number{'s' * (count != 1)}"
+                raise fault(what, expected=f"{self.count} numbers, or one without brackets", received=received)
         last = min(self.ends(self.count - 1).values(), default=0.0)
         if last < 0.0:
             what = "the last axle is off the body at an end of its way, where only a cruise comes onto it"

@@ -121,6 +121,8 @@ def write_document(data: Mapping[str, Any]) -> str:
 
 
 def _file_bytes(path: str | Path) -> bytes:
+    from results_schema.store.files import SIGNATURE
+
     name = str(path)
     try:
         if not S_ISREG(Path(path).stat().st_mode):
@@ -130,6 +132,9 @@ def _file_bytes(path: str | Path) -> bytes:
     except (OSError, ValueError) as error:  # ValueError: a null character in the name
         reason = getattr(error, "strerror", None) or str(error)
         raise BadInput(f"the study file cannot be read: {reason}", where=printable(name, 200)) from None
+    if raw.startswith(SIGNATURE):
+        what, remedy = "this is an archive of results, not a study", f"xarray.open_dataset({shortened(name)})"
+        raise BadInput(what, where=printable(name, 200), expected="a study file (TOML)", remedy=remedy)
     if len(raw) > MAX_BYTES:
         _check_size(name, Path(path).stat().st_size)
     return raw

@@ -3,7 +3,7 @@
 import json
 import re
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -66,7 +66,8 @@ def find_study(study: str) -> Path:
         raise BadInput("this is an archive of results, not a study", where=study, expected=expected, remedy=remedy)
     if path.is_file():
         return path
-    near = _nearest(study, [*known, *map(str, sorted(path.parent.glob("*.toml")))])
+    alike = {file.stem: str(file) for file in sorted(path.parent.glob("*.toml"))}  # all have the same ending
+    near = _nearest(path.stem, {name: name for name in known} | alike)
     if path.is_dir():
         raise BadInput("this is a folder", where=study, expected="a study file (TOML)", remedy=near)
     if path.suffix or len(path.parts) > 1:
@@ -106,7 +107,10 @@ def start_text(kind: str) -> str:
     if kind in built_in():
         return built_in()[kind].read_text(encoding="utf-8")
     if kind not in KINDS.foreign:
-        what, remedy = "no such kind of study, or none with a file to start from", _nearest(kind, known)
+        what, remedy = (
+            "no such kind of study, or none with a file to start from",
+            _nearest(kind, {name: name for name in known}),
+        )
         raise BadInput(what, where=kind, expected=f"one of {', '.join([*known, *KINDS.foreign])}", remedy=remedy)
     return str(cast(Any, KINDS[kind]).start) + shared
 
@@ -131,6 +135,7 @@ def _files(folder: Path) -> Mapping[str, Path]:
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 
-def _nearest(name: str, known: Iterable[str]) -> str:
+def _nearest(name: str, known: Mapping[str, str]) -> str:
+    """A hint at what is known by the name that is most like this one, or ""."""
     near = get_close_matches(name, list(known), n=1)
-    return f'did you mean "{near[0]}"?' if near else ""
+    return f'did you mean "{known[near[0]]}"?' if near else ""

@@ -128,7 +128,6 @@ def run(study: str, archive: Path | None, as_json: bool, verbose: bool, **how: A
         screens.show_outcome(outcome)
         if verbose:
             screens.show_details(outcome)
-    console.warn(*(f"worth knowing: {remark}" for remark in outcome.remarks))
     return code
 
 
@@ -279,14 +278,14 @@ def _run(study: str, archive: Path | None, options: RunOptions) -> Outcome:
     """Run a study to its archive, with a progress bar; signals stop it with finished work kept."""
     with stopping.stop_on_signals() as stop:
         import engine
-        from studies.commands import catalogue, console
+        from studies.commands import catalogue, console, screens
         from studies.runs.runner import run_to_archive
 
         path = catalogue.find_study(study)
         loaded = engine.load(path)
         with console.progress_bar(path.stem) as bar:
-            place = archive or Path(f"{path.stem}.nc")
-            return run_to_archive(loaded, place, options, progress=bar.show, stage=bar.say, stop=stop)
+            place, warn = archive or Path(f"{path.stem}.nc"), screens.warn_of
+            return run_to_archive(loaded, place, options, progress=bar.show, stage=bar.say, remark=warn, stop=stop)
 
 
 def _refuse_what_is_no_archive(archive: Path) -> None:

@@ -34,6 +34,9 @@ GAP = 2  # between the columns of a table
 SECONDS_PER_LINE = 30.0  # of what a run tells where no terminal shows a bar: ten lines in a log of five minutes
 
 _NUMBER = re.compile(r"-?[\d.,e-]+( [^\s\d]\S*)*")
+_UNIT = r"[^\s\d±=]\S*( (?:m|s|kg)(?:/\S+|[²³⁴])?[,;.)]?(?!\S))?"  # a word, and what follows N in N m
+_SYMBOL = r"[A-Za-z]+(?: (?:m|s|kg|rad)-?\d)+(?!\S)|N m(?!\S)"  # of an archive, such as m s-2
+_PIECE = re.compile(rf"(?:± )?\(?-?\d[\d.,e-]*(?<!,)( {_UNIT})?(?!\S)|{_SYMBOL}|\S+")
 
 
 class _Output(Console):
@@ -71,33 +74,74 @@ def say_json(content: Mapping[str, Any]) -> None:
 
 
 def paragraphs(*texts: str) -> None:
-    """Print sentences, wrapped between words, with nothing between them but line breaks."""
+    """Print sentences, wrapped as cells of tables are, with nothing between them but line breaks."""
     console = _output()
-    for text in texts:
-        console.print(Text(printable(text, 10_000)))
+    for line in (line for text in texts for line in _wrapped(printable(text, 10_000), console.width)):
+        console.print(Text(line), soft_wrap=True)
 
 
-def table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Print a table of text; columns of numbers stand to the right."""
+def table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]], tallest: int = LONGEST_CELL) -> None:
+    """Print a table of text; columns of numbers stand to the right. Cells break between words, never within a number
+    or before its unit; where columns have no room for that, or cells take more than so many lines, every row is a
+    block of its own."""
     cells = [[printable(cell, LONGEST_CELL) for cell in row] for row in rows]
-    shown = Table(box=None, padding=(0, GAP, 0, 0), pad_edge=False)
     console = _output()
     numeric = [all(_NUMBER.fullmatch(cell) for cell in column) for column in zip(*cells, strict=True)]
     widths = _widths([headings, *cells], console.width, numeric)
-    for place, (heading, width) in enumerate(zip(headings, widths, strict=True)):
-        side: JustifyMethod = "right" if cells and numeric[place] else "left"
-        shown.add_column(Text(heading, "dim"), justify=side, overflow="fold", no_wrap=place == 0, width=width)
-    for row in cells:
-        shown.add_row(*map(Text, row))
     if title:
         console.print(Text(printable(title, LONGEST_CELL), "bold"), soft_wrap=True)
+    lines = [[_wrapped(cell, width) for cell, width in zip(row, widths, strict=False)] for row in cells]
+    if not widths or max((len(cell) for row in lines for cell in row), default=0) > tallest:
+        _blocks(console, headings, cells)
+        return
+    shown = Table(box=None, padding=(0, GAP, 0, 0), pad_edge=False)
+    for place, (heading, width) in enumerate(zip(headings, widths, strict=True)):
+        side: JustifyMethod = "right" if cells and numeric[place] else "left"
+        shown.add_column(Text("\n".join(_wrapped(heading, width)), "dim"), justify=side, no_wrap=True, width=width)
+    for row in lines:
+        shown.add_row(*(Text("\n".join(cell)) for cell in row))
     console.print(shown)
     console.line()
 
 
-def _widths(rows: Sequence[Sequence[str]], screen: int, numeric: Sequence[bool]) -> list[int | None]:
-    """Widths of columns that wrap between words alone, the first one not at all, and those of numbers only where no
-    other can; None where rich finds them by itself: all fit as they are, or not even their longest words.
+def _blocks(console: Console, headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Rows below one another: the first cell, then all others, each behind its heading; lists on lines of their own."""
+    for name, *others in rows:
+        told = [f"{heading} {cell}".strip() for heading, cell in zip(headings[1:], others, strict=True)]
+        short = "; ".join(text for text in told if "," not in text)
+        for indent, text in ((0, name), *((GAP, text) for text in (short, *(text for text in told if "," in text)))):
+            for line in _wrapped(text, console.width - indent):
+                console.print(Text(" " * indent + line), soft_wrap=True)
+    console.line()
+
+
+def _pieces(text: str) -> list[str]:
+    """A text in pieces that stay on one line: a number with its unit, or a word.
+
+    >>> _pieces("-2.5 kN m ± 15 N m at 139 km/h, variant 21")
+    ['-2.5 kN m', '± 15 N m', 'at', '139 km/h,', 'variant', '21']
+    >>> _pieces("m s-2 or N m")
+    ['m s-2', 'or', 'N m']
+    """
+    return [found[0] for found in _PIECE.finditer(text)]
+
+
+def _wrapped(text: str, width: int) -> list[str]:
+    """Lines of a text, as many pieces on each as have room.
+
+    >>> _wrapped("smallest at 139 km/h", 12), _wrapped("", 3)
+    (['smallest at', '139 km/h'], [''])
+    """
+    lines = [""]
+    for piece in _pieces(text):
+        longer = f"{lines[-1]} {piece}".lstrip()
+        lines[-1:] = [longer] if len(longer) <= width or not lines[-1] else [lines[-1], piece]
+    return lines
+
+
+def _widths(rows: Sequence[Sequence[str]], screen: int, numeric: Sequence[bool]) -> list[int]:
+    """Widths of columns that wrap between words alone, the first one not at all where others can, as those of numbers;
+    none where not even their longest words fit.
 
     >>> rows = [("variants", "scheme", "steps"), ("5", "average-acceleration", "800 to 118,400")]
     >>> _widths(rows, 42, (True, False, False))
@@ -105,23 +149,26 @@ def _widths(rows: Sequence[Sequence[str]], screen: int, numeric: Sequence[bool])
     >>> rows = [("result", "largest", "at"), ("speed", "-2.57 m/s", "mass 1 kg, speed 2 m/s")]
     >>> _widths(rows, 32, (False, True, False))
     [6, 9, 13]
+    >>> _widths(rows, 20, (False, True, False))
+    []
     """
     columns = list(zip(*rows, strict=True))
     whole = [max(map(len, column)) for column in columns]
-    least = [max(len(word) for cell in column for word in [*cell.split(), ""]) for column in columns]
+    least = [max(len(piece) for cell in column for piece in [*_pieces(cell), ""]) for column in columns]
     unbroken = [place == 0 or bool(known) for place, known in enumerate(numeric or [False] * len(columns))]
-    for kept in (unbroken, [place == 0 for place in range(len(columns))]):
+    for kept in (unbroken, [place == 0 for place in range(len(columns))], [False] * len(columns)):
         found = [full if keep else word for full, word, keep in zip(whole, least, kept, strict=True)]
         left = screen - GAP * (len(columns) - 1) - sum(found)
         if left >= 0:
             break
-    if left < 0 or sum(whole) - sum(found) <= left:
-        return [None] * len(columns)
+    if left < 0:
+        return []
+    left = min(left, sum(whole) - sum(found))
     while left:  # for the column whose longest cell takes the most lines
-        place = max(range(len(columns)), key=lambda n: whole[n] / found[n])
+        place = max(range(len(columns)), key=lambda n: whole[n] / max(found[n], 1))
         found[place] += 1
         left -= 1
-    return list(found)
+    return found
 
 
 def heading(title: str) -> None:

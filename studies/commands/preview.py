@@ -12,6 +12,7 @@ from engine.accuracy.grids import SceneGrid
 from engine.batch.audit import audit_size
 from engine.batch.dataset import model_groups
 from engine.batch.plan import Plan
+from engine.batch.plausibility import sprung
 from engine.model.distinct_models import base_scene
 from engine.model.lane_table import moving_mass
 from engine.model.scene_model import SceneModel
@@ -63,7 +64,8 @@ def _of_variants(parts: Variants, threads: int) -> Preview:
     plan = parts.plan
     seen = forecast(plan, threads)
     tables = (
-        *(_study(plan), _bodies(plan.base), *_checks(plan.base), _limits(plan.base)),
+        *(_study(plan), _bodies(plan.base), _tracks(plan.base), *_checks(plan.base)),
+        *(_limits(plan.base), _sprung(plan)),
         *(_sweep(plan.study, plan.cases), _ratios(plan)),
         *_in_step(plan),
         TextTable(seen.title, chosen.HEADINGS, seen.rows),
@@ -133,6 +135,7 @@ def _of_scene(study: Study, cases: Cases) -> Iterator[TextTable]:
     """The scene of a study that is computed in pieces, as a march's preview shows it."""
     base = base_scene(study)
     yield _bodies(base)
+    yield _tracks(base)
     yield from _checks(base)
     yield _sweep(study, cases)
 
@@ -183,6 +186,13 @@ def _bodies(base: SceneModel) -> TextTable:
     return TextTable("Bodies", ("body", "mass", "modes", "frequencies (Hz)", "damping ratio"), rows)
 
 
+def _tracks(base: SceneModel) -> TextTable:
+    """Which end of a track is its beginning, where nodes have names: its members may be listed either way."""
+    ends = {part.name: base.study.body[part.name].track_ends for part in base.bodies}
+    rows = [(name, *nodes, quantity(base.study.body[name].length, "m")) for name, nodes in ends.items() if nodes]
+    return TextTable("Tracks", ("body", "begins at node", "ends at node", "length"), rows)
+
+
 def _checks(base: SceneModel) -> Iterator[TextTable]:
     """One table per body that was checked when it was imported."""
     for part in base.bodies:
@@ -202,6 +212,15 @@ def _limits(base: SceneModel) -> TextTable:
             which = f"{count} of {own.size}" if count < own.size else f"all {count}, and more where more are computed"
             rows.append((name, f"{number(limit)} Hz", which if count else "none: it reads 0"))
     return TextTable("Frequency limits", ("sensor or envelope", "up to", "modes that count"), rows)
+
+
+def _sprung(plan: Plan) -> TextTable:
+    """Masses on their springs, as if these stood on the ground."""
+    rows = [
+        (table.partition(".")[2], f"{spanned(frequencies.ravel())} Hz", spanned(ratios.ravel()))
+        for table, (frequencies, ratios) in sprung(plan).items()
+    ]
+    return TextTable("Sprung masses by themselves", ("carriage", "natural frequency", "damping ratio"), rows)
 
 
 def _sweep(study: Study, cases: Cases) -> TextTable:

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from results_schema.status import Status, label
-from studies.commands.console import blank, heading, paragraphs, say, table
+from studies.commands.console import blank, heading, paragraphs, say, table, warn
 from studies.findings.numerics_used import is_marched, told_choices
 from studies.protocol.study import kind_named
 from studies.reporting.answers import answer_of
+from studies.results.cells import percentile_spans
 from studies.results.findings_common import missed_most, remedy
-from studies.results.formatting import counted, listed, number, quantity
+from studies.results.formatting import counted, listed, number, quantity, spanned
 from studies.results.results import Results
 from studies.runs.audit import told_accuracy, told_audit
 
@@ -28,20 +30,32 @@ if TYPE_CHECKING:
 BESIDE = ("_position", "_time", "_rms", "_used", "elapsed")  # endings of what `info` lists with --all alone
 LONGEST_LIST = 300  # letters
 MOST_ALIKE = 4  # results that are the same in every variant and told with their value
+TALLEST = 4  # lines of a row of that table
 MOST_ROWS = 14  # of the table at the end of a run, which is to stay on the screen
 
 
 def show_preview(shown: Preview) -> None:
     """What `check` found: what looks wrong before all numbers that follow from it."""
-    doubts = [remark for remark in shown.remarks if "?" in remark]  # whether something is meant, as remarks ask it
+    doubts, others = _sorted(shown.remarks)
     if doubts:
         paragraphs("Is this meant?", *(f"- {remark}" for remark in doubts), "")
     for part in shown.tables:
         table(part.title, part.headings, part.rows)
     say(shown.cost)
-    others = [remark for remark in shown.remarks if remark not in doubts]
     if others:
         say("", "Worth knowing", *(f"- {remark}" for remark in others))
+
+
+def warn_of(remarks: Sequence[str]) -> None:
+    """The same of a run, on standard error."""
+    doubts, others = _sorted(remarks)
+    warn(*(f"is this meant? {remark}" for remark in doubts), *(f"worth knowing: {remark}" for remark in others))
+
+
+def _sorted(remarks: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Those that ask whether something is meant, and the others."""
+    doubts = [remark for remark in remarks if "?" in remark]
+    return doubts, [remark for remark in remarks if "?" not in remark]
 
 
 def show_studies(
@@ -110,6 +124,7 @@ def show_outcome(outcome: Outcome) -> None:
     paragraphs(*answer_of(results))
     if not summary.is_measured(outcome.results):  # the grid of those that measure is of methods: its ends say nothing
         _ranges(summary.in_tables(results), results.percentiles)
+        _percentiles(results, [_name(one) for one in summary.in_tables(results)][:MOST_ROWS])
     accuracy = told_accuracy(outcome.audit, results)
     paragraphs(*_about_statuses(results), *([f"Accuracy: {accuracy}"] if accuracy else []))
     paragraphs(f"{_about_work(outcome)}. Next: wanderlast report {outcome.archive}")
@@ -132,25 +147,23 @@ def show_details(outcome: Outcome) -> None:
 
 
 def _ranges(found: Sequence[Range], percentiles: Sequence[float]) -> None:
-    """Each result with its range, and the variant of the end of larger size; in a sentence those that do not change."""
-    axes = list(dict.fromkeys(name for one in found for name in one.extreme.words))
+    """Each result with its range, and where the end is that tells most; in a sentence those that do not change."""
     blank()
-    if not axes:
+    if not any(one.extreme.words for one in found):
         table("", ("result", "value"), [(_name(one), one.said(one.extreme)) for one in found])
         return
     parts = [f"{number(part)} %" for part in percentiles]
-    where = f"extreme at {', '.join(name.replace('_', ' ') for name in axes)}"
-    varied = [one for one in found if not one.is_constant]
     rows = [
         (
             _name(one),
             *(one.value(value) for value in (one.smallest.value, *one.percentiles, one.largest.value)),
-            ", ".join(one.extreme.words.values()),
+            f"{'largest' if one.telling is one.largest else 'smallest'} at {one.telling.where.replace('_', ' ')}",
         )
-        for one in varied
+        for one in found
+        if not one.is_constant
     ]
     if rows:
-        table("", ("result", "smallest", *parts, "largest", where), rows[:MOST_ROWS])
+        table("", ("result", "smallest", *parts, "largest", ""), rows[:MOST_ROWS], tallest=TALLEST)
     if rows[MOST_ROWS:]:
         paragraphs(f"{len(rows) - MOST_ROWS} more results: run -v, or the report.")
     same = [f"{_name(one)} {one.value(one.largest.value)}" for one in found if one.is_constant]
@@ -162,6 +175,18 @@ def _ranges(found: Sequence[Range], percentiles: Sequence[float]) -> None:
         paragraphs(f"By their told errors hardly known: {', '.join(loose)}.")
 
 
+def _percentiles(results: Results, shown: Sequence[str]) -> None:
+    """Of an archive of several cells, in which each has its own."""
+    found = {name: (units, values) for name, units, values in percentile_spans(results) if name in shown}
+    rows = [
+        (name, *(spanned(span, partial(quantity, units=units)) for span in values.T))
+        for name, (units, values) in sorted(found.items(), key=lambda one: shown.index(one[0]))
+    ]
+    if rows:
+        parts = [f"{number(part)} %" for part in results.study.output.percentiles]
+        table(f"Percentiles of {counted(results.size, 'cell')}, from one to another", ("result", *parts), rows)
+
+
 def _name(found: Range) -> str:
     return f"{found.name} {found.sensor}".strip()
 
@@ -171,6 +196,8 @@ def show_comparison(found: Comparison) -> None:
     changes = [(change.key, _value(change.first), _value(change.second)) for change in found.changes]
     if changes:
         table("The studies differ", ("key", "first", "second"), changes)
+    if found.programs:
+        paragraphs(f"Made by different states of the program: {listed(found.programs)}.")
     only = f"; {found.only_first:,} only in the first, {found.only_second:,} only in the second"
     alone = only if found.only_first or found.only_second else ""
     paragraphs(f"{counted(found.variants, 'variant')} in both{alone}.")

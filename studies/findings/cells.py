@@ -1,27 +1,67 @@
 """What an archive of cells of variants says: extremes of sensors and contact forces, and how many variants it is of."""
 
+import numpy as np
+
+from results_schema.arrays import Array
+from studies.findings.beyond import LIMIT, limits_of
+from studies.results.axes import Axis
 from studies.results.cells import CellRange, End, cell_ranges, words_of
 from studies.results.findings_common import told_statuses
-from studies.results.formatting import counted, listed, quantity
+from studies.results.formatting import counted, listed, quantity, spanned
 from studies.results.results import Results
 
 MOST_TOLD = 3
 
 
 def findings_of_cells(results: Results) -> list[str]:
-    """The answer in sentences."""
-    ranges = list(cell_ranges(results))
-    shown = [name for sensor in results.sensors for name in (f"{sensor}_max", f"{sensor}_min")]
+    """The answer in sentences: first what the question names a limit of."""
+    ranges, limits = {one.name: one for one in cell_ranges(results)}, _limits(results)
+    sensors = sorted(results.sensors, key=lambda name: name not in limits)
+    shown = [name for sensor in sensors for name in (f"{sensor}_max", f"{sensor}_min")]
     shown += [f"{name}_contact_force_min" for name, one in results.study.carriage.items() if one.inertial]
-    told = [_told(results, one) for one in ranges if one.name in shown][:MOST_TOLD]
+    judged = {f"{sensor}_max": _judged(results, sensor, limit) for sensor, limit in limits.items()}
+    told = [f"{_told(results, ranges[name])}{judged.get(name, '')}" for name in shown if name in ranges][:MOST_TOLD]
+    residual = "residual" in results.study.question
     kept = ["the extremes of every result", "the variants that have them", "the numbers of variants by status"]
     kept += ["percentiles"] if results.study.output.percentiles else []
     cells = f" of each of {counted(results.size, 'cell')} ({listed(results.dims)})" if results.dims else ""
     return [
         *told,
         f"Of {counted(results.variants, 'variant')} the archive keeps {listed(kept)}{cells}.",
+        *(["Limits of residual vibrations are judged where all variants are kept."] * residual),
         *told_statuses(results),
     ]
+
+
+def _limits(results: Results) -> dict[str, float]:
+    """The limits that the question names, by sensor."""
+    named = limits_of(results.study)
+    limits = {name: named.limit(sensor.quantity) for name, sensor in results.study.sensor.items()}
+    return {name: limit for name, limit in limits.items() if limit is not None}
+
+
+def _judged(results: Results, sensor: str, limit: float) -> str:
+    """In which cells some variant of a sensor is beyond its limit, from the extremes of the cells: a sentence."""
+    ends = (("largest", f"{sensor}_max"), ("smallest", f"{sensor}_min"))
+    sizes = [np.abs(results.dataset[side].sel(result=name).transpose(*results.dims).values) for side, name in ends]
+    beyond = np.nan_to_num(np.maximum(*sizes)) > limit
+    said = f"{LIMIT}{quantity(limit, results.sensors[sensor])}"
+    if not beyond.any():
+        return f"{said} nowhere."
+    if not results.dims:
+        return f"{said} in some of the variants."
+    many = f"{int(beyond.sum()):,}" if not beyond.all() else "all"
+    return f"{said} in some variants of {many} of {counted(results.size, 'cell')}{_along(results, beyond)}."
+
+
+def _along(results: Results, beyond: Array) -> str:
+    """Of cells along one swept number, which these are where they lie side by side."""
+    axes: list[Axis] = [axis for axis in results.axes if axis.dim in results.dims]
+    if len(axes) != 1 or beyond.ndim != 1 or beyond.all():
+        return ""
+    values = np.sort(axes[0].values[beyond])
+    between = (axes[0].values >= values[0]) & (axes[0].values <= values[-1])
+    return f", {axes[0].noun} {spanned(values, axes[0].in_words)}" if between.sum() == values.size else ""
 
 
 def _told(results: Results, found: CellRange) -> str:

@@ -154,7 +154,7 @@ class Variants:
 
     def __init__(self, kind: Kind, study: Study) -> None:
         from engine.batch.plan import make_plan
-        from engine.batch.plausibility import remarks
+        from engine.batch.plausibility import check_limits, remarks
 
         if study.output.unreduced:
             from engine.unreduced.comparison import check_unreduced
@@ -162,6 +162,7 @@ class Variants:
             check_unreduced(study)
         self.kind = kind
         self.plan = make_plan(study, reduction=kind.reduction(study), results=kind.name)
+        check_limits(self.plan)
         self.words = f"the parts and the archive of {self.plan.size} variants"
         # The parts, the archive, and results on their way from these to that where they do not fit into memory.
         self.disk_bytes = 2 * self.plan.disk_bytes + (self.plan.disk_bytes - self.plan.gathered_bytes)

@@ -18,6 +18,7 @@ from studies.at_rest.errors import errors_along
 from studies.findings.absolute_errors import absolute_errors
 from studies.reporting.summary import Range, asked
 from studies.results.results import Results
+from studies.runs.identity import SOURCES
 
 
 class Difference(NamedTuple):
@@ -46,11 +47,13 @@ class Difference(NamedTuple):
 
 @dataclass(frozen=True)
 class Comparison:
-    """What differs between two archives. variants: in both; only_first, only_second: in one of them. statuses: how many
+    """What differs between two archives. programs: the program's version and the hash of its sources in each, where
+    these are not the same. variants: in both; only_first, only_second: in one of them. statuses: how many
     went from which status to which. only_in_one: results that the other has not, or not in the same shape.
     """
 
     changes: list[Change]
+    programs: tuple[str, ...]
     variants: int
     only_first: int
     only_second: int
@@ -72,12 +75,15 @@ def compare(first: Results, second: Results) -> Comparison:
             raise BadInput(what, where=one.study.title or one.study.kind, expected='output.keep = "all"')
     if first.dims != second.dims:
         what = "the archives have different axes, so there is nothing to compare"
-        raise BadInput(what, where=", ".join(second.dims) or "no axes", expected=", ".join(first.dims) or "no axes")
+        axes = [", ".join(one.dims) or "none" for one in (first, second)]
+        received = f"{axes[0]} in the first, {axes[1]} in the second"
+        raise BadInput(what, where="compare", expected="the same axes in both", received=received)
     mine, other = xr.align(first.dataset, second.dataset, join="inner", copy=False, exclude=_not_swept(first, second))
     both, own = Results(mine, first.study, first.models), Results(other, second.study, second.models)
     found, missing = _shared(both, own)
     return Comparison(
         changes=changes(first.study.source.text, second.study.source.text),
+        programs=_programs(first, second),
         variants=both.size,
         only_first=first.size - both.size,
         only_second=second.size - both.size,
@@ -85,6 +91,13 @@ def compare(first: Results, second: Results) -> Comparison:
         differences=list(_differences(both, own, found)) if both.size else [],
         only_in_one=missing,
     )
+
+
+def _programs(*archives: Results) -> tuple[str, ...]:
+    """What made each archive, where that differs."""
+    made = [(one.dataset.attrs.get("packages", ["unknown"])[0], one.dataset.attrs.get(SOURCES)) for one in archives]
+    found = tuple(f"{version}, sources {sources or 'unknown'}" for version, sources in made)
+    return found if len(set(found)) > 1 else ()
 
 
 def _not_swept(first: Results, second: Results) -> set[str]:

@@ -71,6 +71,13 @@ class Range:
         return max(self.largest, self.smallest, key=lambda end: abs(end.value))
 
     @property
+    def telling(self) -> Extreme:
+        """The end that is looked for: the smallest of what is smallest over time, such as a contact force, the largest
+        of what is largest, and of others that of larger magnitude."""
+        sides = {"_min": self.smallest, "_max": self.largest}
+        return next((end for ending, end in sides.items() if self.name.endswith(ending)), self.extreme)
+
+    @property
     def is_constant(self) -> bool:
         """Whether its values differ by rounding alone."""
         return self.largest.value - self.smallest.value <= max(ALIKE * abs(self.extreme.value), NOISE * self.beside)

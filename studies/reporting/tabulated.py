@@ -18,11 +18,13 @@ from results_schema.errors import BadInput
 from results_schema.lazy_imports import xr
 from results_schema.store import files
 from studies.results.axes import Axis
+from studies.results.formatting import typed_unit
 from studies.results.results import Results
 
 if TYPE_CHECKING:
     import pandas as pd
 
+SWEPT = "swept"  # the dimension along which cells name the swept numbers of a variant
 MOST_COLUMNS = 64  # of one result
 ROWS_AT_ONCE = 2**17  # variants, of which a table is in memory
 
@@ -100,6 +102,8 @@ def table_of(results: Results, chosen: Sequence[str] = ()) -> tuple[pd.DataFrame
             left_out += [str(name)] if name in dataset.data_vars else []
             continue
         parts = [_as_typed(swept[str(name)], array)] if name in swept else _columns(str(name), array, own)
+        if own == (SWEPT,):
+            parts = list(_where(results, str(name), array))
         for heading, one in parts:
             columns[heading] = _words(xr.broadcast(one, like)[0].transpose(*rows).values.reshape(-1), array.attrs)
     return pd.DataFrame(columns), left_out
@@ -134,8 +138,22 @@ def _as_typed(axis: Axis, array: xr.DataArray) -> tuple[str, xr.DataArray]:
     """A swept number in the unit of the study file, with its heading; without the last digits of the conversion."""
     if axis.typed is None:
         return _columns(axis.name, array, ())[0]
-    values = [float(f"{value:.12g}") for value in axis.shown]
+    values = [_short(value) for value in axis.shown]
     return f"{axis.name} ({axis.typed.unit})", array.copy(data=values)
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.12g}")
+
+
+def _where(results: Results, name: str, array: xr.DataArray) -> Iterator[tuple[str, xr.DataArray]]:
+    """Swept numbers of the variants that cells tell of, each in the unit of the study file, with its heading."""
+    for place, axis in enumerate(array[SWEPT].values.tolist()):
+        own, typed = array.isel({SWEPT: place}).drop_vars(SWEPT), typed_unit(results.study, axis)
+        unit = typed.unit if typed else str(array["swept_unit"].values[place])
+        if typed:
+            own = own.copy(data=np.vectorize(_short, otypes=[float])(own.values * typed.factor))
+        yield f"{name} {axis}{f' ({unit})' if unit not in ('', '1') else ''}", own
 
 
 def _words(values: NDArray[Any], attributes: Mapping[str, Any]) -> NDArray[Any]:

@@ -81,6 +81,19 @@ def cell_ranges(results: Results) -> Iterator[CellRange]:
         yield CellRange(name, sensor, units, ends[0], ends[1], parts)
 
 
+def percentile_spans(results: Results) -> Iterator[tuple[str, str, Array]]:
+    """Of every result of several cells its name, its unit, and each percentile's smallest and largest value (2, P)."""
+    dataset = results.dataset
+    if "percentile" not in dataset or results.size == 1:
+        return
+    values = dataset["percentile"].transpose("result", ..., "percent").values
+    for name, units, own in zip(dataset["result"].values, dataset["result_unit"].values, values, strict=True):
+        cells = own.reshape(-1, own.shape[-1])
+        cells = cells[~np.isnan(cells).any(axis=1)]
+        if cells.size:
+            yield str(name), str(units), np.stack([cells.min(axis=0), cells.max(axis=0)])
+
+
 def _end(dataset: xr.Dataset, side: str, place: int, pick: object) -> End | None:
     """The extreme of all cells."""
     values: Array = dataset[side].isel(result=place).values.ravel()

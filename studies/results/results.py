@@ -319,6 +319,11 @@ class Results:
         error = self.dataset["estimated_error"].sel(result=result).transpose(*self.dims)
         return np.asarray(error.values, dtype=np.float64)
 
+    def each_within_tolerance(self, which: Mask) -> bool:
+        """Whether all estimated errors of some variants are within what is asked of their results."""
+        asked = zip(self.dataset["result"].values, self.dataset["tolerance"].values, strict=True)
+        return all(not np.nanmax(self.estimated_error(str(name))[which], initial=0.0) > most for name, most in asked)
+
     def error_at(self, result: str, index: Index) -> float:
         """The same of one variant."""
         if "estimated_error" not in self.dataset or result not in self.dataset["result"].values:

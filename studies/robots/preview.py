@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from engine.march.stepper import Halted
+from results_schema.status import Status, label
 from studies.protocol.parts import Foreseen, TextTable
 from studies.results.formatting import counted, number, quantity, scientific, spanned
 from studies.results.places import spread
@@ -96,15 +97,27 @@ def foreseen(study: Study, question: Question, threads: int, audited: int) -> Fo
     marched = [one.model.study.body[name].modes for one in found.values() for name in open_bodies(study)]
     most = min(max(map(int, marched), default=MODES[0]), MAX_MODES)  # no study file may fix more
     fuller = study.with_values({f"body.{name}.modes": most for name in open_bodies(study)})
-    less = "" if found else f"{PATIENCE:.0f} seconds were not enough for a variant to converge: this may take longer"
+    less = (
+        _fallen(found)
+        if found
+        else f"{PATIENCE:.0f} seconds were not enough for a variant to converge: this may take longer"
+    )
     table = _taken(cases, {variant: found[variant] for variant in sorted(found)})
-    return Foreseen(fuller, table, float(each * (marches + again)), _bytes(study, cases), less)
+    return Foreseen(
+        fuller, table, float(each * (marches + again)), _bytes(study, cases), _fallen(found) if found else less
+    )
+
+
+def _fallen(found: dict[int, Converged]) -> str:
+    """Of variants in which nothing rests, which take no time either; "" where there are none."""
+    fallen = sum(one.status == Status.FALLS_OVER for one in found.values())
+    which = f"all {len(found)}" if fallen == len(found) else f"{fallen} of {len(found)}"
+    said = f"{which} variants that were tried fall over: a joint is softer than the weight that it has to hold up"
+    return said if fallen else ""
 
 
 def _taken(cases: Cases, found: dict[int, Converged]) -> TextTable:
     """What some variants were marched with."""
-    from results_schema.status import label
-
     headings = ("variant", "modes of all rails", "steps", "estimated error", "status")
     rows = [
         (

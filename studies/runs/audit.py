@@ -255,6 +255,8 @@ def _held_accuracy(group: xr.Dataset | None, results: Results) -> str:
     errors = "estimated errors" if fine.all() else "estimated errors of those that are ok"
     found = f"{errors} at most {scientific(float(estimates.max()))}" if estimates.size else "no status is ok"
     said = f"{found} where {_span(tolerances)} was asked"
+    if estimates.size and tolerances.min() < tolerances.max() and results.each_within_tolerance(fine):
+        said = f"{found}, each within its own tolerance ({_span(tolerances)})"
     return f"{said}; {_none(results) if group is None else _compared(group, results)}"
 
 

@@ -20,6 +20,7 @@ PROGRAM = Path(__file__).parents[2]
 PACKAGES = ("engine", "results_schema", "studies")
 TABLES = (BODIES, CARRIAGES, MOTIONS, QUANTITIES, ALL_SCHEMES, KINDS)
 PIECES = "foreign_pieces"  # the attribute of an archive that names those of its study
+SOURCES = "sources"  # the attribute that tells programs of one version apart
 DRAWING = PROGRAM / "studies" / "pictures"  # of what is finished: no number depends on it
 LIBRARIES = ("numpy", "scipy")  # numba and its compiler belong to the kernels' hash
 

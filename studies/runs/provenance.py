@@ -12,10 +12,11 @@ from engine.scene.study import Study
 from results_schema.store.archive import FILES, files_text
 from results_schema.store.reading import SCHEMA_VERSION
 from studies.protocol.study import study_attributes
-from studies.runs.identity import PIECES, files_of, foreign_pieces
+from studies.runs.identity import PIECES, SOURCES, files_of, foreign_pieces, sources, sources_hash
 
 CONVENTIONS = "CF-1.11"
 PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "xarray", "netCDF4", "dask", "pydantic", "pint")
+DIGITS = 12  # of the hash of our sources: people compare them
 
 
 def attributes(study: Study, key: str, seconds: float) -> Mapping[str, Any]:
@@ -28,6 +29,7 @@ def attributes(study: Study, key: str, seconds: float) -> Mapping[str, Any]:
         **({PIECES: pieces} if (pieces := foreign_pieces(study)) else {}),
         "schema_version": SCHEMA_VERSION,
         "results_key": key,
+        SOURCES: sources_hash(sources())[:DIGITS],
         "packages": [f"{name} {version_of(name)}" for name in ("wanderlast", *PACKAGES)],
         "python": platform.python_version(),
         "machine": machine(),

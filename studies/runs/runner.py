@@ -5,7 +5,7 @@ Killed at any moment it leaves finished parts behind, and goes on from them when
 
 import os
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial, singledispatch
@@ -72,10 +72,11 @@ def run_to_archive(
     *,
     progress: Progress | None = None,
     stage: Callable[[str], None] | None = None,
+    remark: Callable[[Sequence[str]], None] | None = None,
     stop: Stop | None = None,
 ) -> Outcome:
-    """Run a study and write its archive, or find it finished there. progress, stage: told what is done, and what is
-    being done.
+    """Run a study and write its archive, or find it finished there. progress, stage, remark: told what is done, what is
+    being done, and before anything is computed what is worth knowing.
 
     Raises BadInput, and OutputFailed where nothing can be written or the disk is too small, before anything is
     computed or written; later Interrupted, OutputFailed and ArchiveBusy with finished work kept; ArchiveError when
@@ -90,6 +91,7 @@ def run_to_archive(
     _look(run)
     parts = kind.parts(study)
     files.check_free(archive.parent, parts.disk_bytes - bytes_so_far(archive), parts.words)
+    (remark or _unheard)(parts.remarks)
     key, name = run_key(study, parts.names), study.source.name
     with PartStore(archive, key, partial(_look, run), study=name, discard=options.overwrite) as store:
         if _look(run) == "same study, finished":  # somebody else has finished it since the run began
@@ -105,7 +107,7 @@ def run_to_archive(
     return Outcome(archive, root, resumed, False, seconds, tuple(parts.remarks), groups.get(GROUP))
 
 
-def _unheard(words: str) -> None:
+def _unheard(words: object) -> None:
     """Nobody wants to know."""
 
 

@@ -7,12 +7,16 @@ import pytest
 
 import engine
 import engine.batch.plan
+from engine.batch.plan import make_plan
+from engine.batch.plausibility import remarks
 from engine.bodies.build import build_body
 from engine.bodies.frame.frame import Frame
 from engine.scene.study import Study, load
 from engine.scene.sweep import expand
 from engine.study_file.document import write_document
 from results_schema.errors import BadInput
+from studies.commands.preview import preview
+from studies.protocol.study import kind_of
 from tests.bodies.frames import AREA, DENSITY, LENGTH, MODULUS, SECOND_MOMENT, straight
 from tests.engine.build import beam
 from tests.scene.mutations import HOW, How, Mutation, mutations, survives
@@ -319,3 +323,28 @@ def test_dampers_at_nodes_are_those_of_the_beam() -> None:
 )
 def test_whether_it_is_one_span(changes: dict[str, Any], one: bool) -> None:
     assert Frame.model_validate(BRIDGE | changes).is_one_span is one
+
+
+@pytest.mark.parametrize(("members", "ends"), [(["left", "right"], ("a", "c")), (["right", "left"], ("c", "a"))])
+def test_check_tells_where_a_track_begins(members: list[str], ends: tuple[str, str]) -> None:
+    """Whichever way its members run: `right` runs against the one track, and `left` against the other."""
+    bridge = BRIDGE | {"track": {"members": members}}
+    given = Study(**STUDY | {"body": {"bridge": bridge}, "solver": {"steps": 200, "audit": 0}})
+    tables = preview(kind_of(given).parts(given), 1).tables
+    assert [table.rows for table in tables if table.title == "Tracks"] == [[("bridge", *ends, "8 m")]]
+
+
+def test_a_track_of_one_member_runs_as_its_nodes_do() -> None:
+    alone = Study(**STUDY | {"body": {"bridge": BRIDGE | {"track": {"members": ["right"]}}}})
+    assert alone.body["bridge"].track_ends == ("c", "b")
+
+
+@pytest.mark.parametrize(("places", "quantity"), [(6, "bending_moment"), (5, "bending_moment"), (6, "displacement")])
+def test_envelopes_that_pass_over_the_end_of_a_member_are_told(places: int, quantity: str) -> None:
+    """Of what has a kink there; of six places of 8 m none is in the middle."""
+    envelope = {"deck": {"body": "bridge", "quantity": quantity, "places": places}}
+    given = Study(**STUDY | {"envelope": envelope, "solver": {"steps": 2000, "audit": 0}})
+    told = [
+        text for text in remarks(make_plan(given)) if text.startswith("no place of envelope deck is at 4 m of bridge")
+    ]
+    assert len(told) == (places == 6 and quantity == "bending_moment")

@@ -4,6 +4,7 @@ import csv
 import json
 import re
 import tomllib
+from importlib.metadata import version
 from pathlib import Path
 
 import jsonschema
@@ -15,11 +16,13 @@ import studies
 from results_schema.store.archive import open_archive
 from studies.commands import catalogue
 from studies.commands.cli import main
+from studies.commands.screens import show_comparison
 from studies.reporting import summary
 from studies.reporting.comparison import compare
 from studies.results.formatting import quantity
 from studies.results.results import Results
 from studies.runs.archived import results_of
+from studies.runs.identity import sources, sources_hash
 from tests.studies.small import SEPARATED, SMALL, write
 
 Captured = pytest.CaptureFixture[str]
@@ -46,6 +49,48 @@ def test_screens_fit_80_columns_and_speak_the_units_of_the_file(here: Path, caps
     screens = [shown, *(output(capsys, *command) for command in (["info", "small.nc"], ["list"]))]
     assert all(len(line) <= 80 for screen in screens for line in screen.splitlines())
     assert "1.8 to 36 km/h" in output(capsys, "check", "small.toml")
+
+
+WIDE = (
+    SMALL[: SMALL.index("speed = {")]
+    + """
+speed = { of = "carriage.trolley.motion.speed", sobol = 8, from = "2 km/h", to = "36 km/h" }
+mass = { of = "carriage.trolley.mass", sobol = 8, from = 0.1, to = 1.0 }
+damping_ratio = { of = "body.beam.damping_ratio", sobol = 8, from = 0.01, to = 0.03 }
+gravity = { of = "gravity", sobol = 8, from = 9, to = 10 }
+
+[output]
+percentiles = [5, 50, 95]
+
+[solver]
+steps = 400
+audit = 0
+"""
+)
+
+
+def test_no_table_breaks_within_a_number_or_before_its_unit(here: Path, capsys: Captured) -> None:
+    """Where columns have no room each result is a block; which of its ends is where is told."""
+    write(here, WIDE)
+    write(here, WIDE.replace("modes = 4", "modes = 3"), "other.toml")
+    shown = output(capsys, "run", "small.toml", "-v")
+    assert main(["run", "other.toml"]) == 0
+    compared = output(capsys, "compare", "small.nc", "other.nc")
+    assert all(len(line) <= 80 for line in (shown + compared).splitlines())
+    assert not re.search(r"\d *\n *(m|mm|µm|N|kN|m/s²|km/h|kg|%|s|Hz)\b", shown + compared)
+    results = results_of(open_archive("small.nc"))
+    for one in summary.in_tables(results):
+        values = (one.smallest.value, *one.percentiles, one.largest.value)
+        assert one.is_constant or all(f" {one.value(value)}" in shown for value in values)
+        assert one.is_constant or f"{one.name} {one.sensor}".strip() in shown.splitlines()
+    for found in compare(results, results_of(open_archive("other.nc"))).differences:
+        assert all(quantity(value, found.units) in compared for value in (*found.values, *found.extremes))
+    blocks = shown[shown.index("\ntrolley_contact_force_min\n") :].split("\n  ")
+    lowest = float(results.dataset.trolley_contact_force_min.min())
+    [low] = [one for one in summary.in_tables(results) if one.name == "trolley_contact_force_min"]
+    assert low.telling.value == lowest and blocks[2].startswith(f"smallest at speed {low.telling.words['speed']}")
+    [high] = [one for one in summary.in_tables(results) if one.name == "midspan_max"]
+    assert high.telling.value == float(results.dataset.midspan_max.max())
 
 
 def test_forces_that_press_as_they_are_written_stand_in_no_table(here: Path, capsys: Captured) -> None:
@@ -130,11 +175,27 @@ def test_compare_tells_what_differs(here: Path, capsys: Captured) -> None:
     assert "body.beam.damping_ratio" in shown and "midspan_max" in shown and "They differ" in shown
     assert "agree within" in output(capsys, "compare", "small.nc", "small.nc")
     assert main(["compare", "small.nc", "other.nc"]) == 2
+    assert "received speed, mass in the first, speed in the second" in capsys.readouterr().err
     apart = open_archive("finer.nc").root.midspan_max - open_archive("small.nc").root.midspan_max
     found = compare(results_of(open_archive("small.nc")), results_of(open_archive("finer.nc")))
     told = next(one for one in found.differences if one.name == "midspan_max")
     assert abs(told.largest) == pytest.approx(float(abs(apart).max()), rel=1e-12)
     assert [(change.key, change.first, change.second) for change in found.changes] == [("body.beam.modes", 4, 5)]
+
+
+def test_compare_tells_other_states_of_the_program(here: Path, capsys: Captured) -> None:
+    write(here)
+    assert main(["run", "small.toml"]) == 0
+    made = results_of(open_archive("small.nc"))
+    other = Results(made.dataset.assign_attrs(sources="0123456789ab"), made.study, made.models)
+    assert compare(made, made).programs == ()
+    found = compare(other, made)
+    own = f"wanderlast {version('wanderlast')}, sources "
+    assert found.programs == (f"{own}0123456789ab", own + sources_hash(sources())[:12]) and found.agree
+    show_comparison(found)
+    assert f"Made by different states of the program: {own}0123456789ab and" in " ".join(
+        capsys.readouterr().out.split()
+    )
 
 
 def test_compare_shows_both_values_where_they_differ_most_and_both_of_largest_size(

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from engine.kernels.compiling import WORDS
-from studies.commands.console import progress_bar, say_compiling
+from studies.commands.console import paragraphs, progress_bar, say_compiling
 from tests.studies.small import ROOT, SEPARATED, command, finish, write
 
 
@@ -125,3 +125,11 @@ def test_the_progress_bar_is_for_terminals(tmp_path: Path) -> None:
     assert process.returncode == 0
     assert b"small" in shown and b"/16" in shown
     assert b"\x1b" not in output
+
+
+def test_sentences_break_neither_numbers_nor_before_units(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "16")
+    paragraphs("with car at 7.53 m, 15.2 kN m ± 3 N m")
+    assert capsys.readouterr().out == "with car at\n7.53 m,\n15.2 kN m\n± 3 N m\n"

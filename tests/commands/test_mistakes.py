@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from results_schema.errors import BadInput
 from studies.commands.cli import main
 from tests.studies.small import SMALL
 
@@ -31,6 +32,10 @@ MISTAKES = {
     "fibres in mm": (
         SMALL.replace("area =", "fibre_distance = 220\narea ="), 0, ["fibre_distance = 220 m", '"220 mm"'],
     ),
+    "a spring in kN/m": (
+        SMALL.replace('kind = "mass"', 'kind = "oscillator"\nstiffness = 0.2\ndamping = 0.04'),
+        0, ["trolley swings at 0.071 Hz", "kilonewtons per metre meant?", "0.0712 to 0.225 Hz  0.0447 to 0.141"],
+    ),
     "density in g/cm3": (SMALL.replace("= 1000.0", "= 7.85"), 0, ["density = 7.85", '"7.85 g/cm^3"']),
     "length in mm": (SMALL.replace("length = 1.0", "length = 15000"), 0, ["length = 15000 m", '"15000 mm"']),
     "a way in mm": (SMALL.replace("end = 1.0", "end = 1000"), 0, ["goes from 0 to 1000 m", "units"]),
@@ -38,6 +43,22 @@ MISTAKES = {
     "gravity below a sensor": (SMALL.replace("at = 0.5", "at = 0.5\ngravity = 9.81"), 2, ["at the top of the file"]),
     "scheme below sweep": (axis(SWEEP + 'scheme = "auto"'), 2, ["scheme is a key of [solver]"]),
     "an axis as a list": (axis("mass = [1, 2]"), 2, ["sweep.mass", "{ of = "]),
+    "an axis of one unit": (
+        axis('v = { of = "carriage.trolley.motion.speed", from = "2 km/h", to = 160, count = 3 }'),
+        2, ["sweep.v", '"2 km/h" and 160', "160 needs its unit too"],
+    ),
+    "a value without its unit": (
+        axis('m = { of = "carriage.trolley.mass", values = [1, "0.002 t"] }'),
+        0, ["sweep.m lists 1 with", "is 1 kg meant?"],
+    ),
+    "zero beside a unit": (axis('v = { of = "gravity", from = 0, to = "1 km/s^2", count = 2 }'), 0, ["0 to 1"]),
+    "random draws": (
+        axis('m = { of = "carriage.trolley.mass", random = 256, from = 1, to = 2 }'),
+        2, ["sweep.m.random", "sobol = N"],
+    ),
+    "percentiles as parts of one": (
+        f"{SMALL}\n[output]\npercentiles = [0.05, 0.5, 0.95]\n", 2, ["output", "0.05, 0.5, 0.95", "percent: 5, 50, 95"],
+    ),
     "an axis of half a key": (axis('v = { of = "speed", values = [1] }'), 2, ["carriage.trolley.motion.speed"]),
     "a key of another kind": (SMALL.replace("mass = 1.0\n", "mass = 1.0\nstiffness = 1e6\n"), 2, ['kind "oscillator"']),
     "a body without a name": (SMALL.replace("[body.beam]", "[body]"), 2, ["[body.NAME]"]),
@@ -161,6 +182,22 @@ def test_what_looks_wrong_stands_before_all_tables(capsys: pytest.CaptureFixture
     assert message.startswith("Is this meant?\n- body.beam.density = 7.85 kg/m3")
     assert message.count("7.85 kg/m3") == 1
     assert message.index("Worth knowing\n- body beam is released") > message.index("Bodies")
+
+
+def test_a_run_asks_before_it_computes(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    def compute(*_: object) -> None:
+        assert "is this meant? body.beam.density = 7.85 kg/m3" in capsys.readouterr().err
+        raise BadInput("enough")
+
+    monkeypatch.setattr("studies.protocol.parts.Variants.compute", compute)
+    Path("study.toml").write_text(SMALL.replace("= 1000.0", "= 7.85"))
+    told(capsys, 2, "run", "study.toml")
+
+
+def test_no_file_is_proposed_for_its_ending_alone(capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ("59_cells.toml", "b.toml"):
+        Path(name).write_text(SMALL)
+    assert "did you mean" not in told(capsys, 2, "check", "a9.toml")
 
 
 @pytest.mark.parametrize(

@@ -11,4 +11,4 @@ def test_it_is_told_once_and_only_when_something_is_compiled() -> None:
         assert said == []
         for step in (1.0, 2.0):
             numba.njit(lambda x, step=step: x + step)(1.0)
-    assert said == [WORDS]
+    assert said == [WORDS] and "for this kind of scene" in WORDS  # others have kernels of their own

@@ -113,6 +113,19 @@ def test_a_limit_below_the_first_mode_reads_nothing() -> None:
     assert table == {"none": ("1 Hz", "none: it reads 0"), "some": ("2 Hz", "1 of 4")}
 
 
+@pytest.mark.parametrize("table", ["sensor", "envelope"])
+def test_a_study_whose_limit_no_mode_reaches_is_refused(table: str) -> None:
+    """Before anything is computed; where some variants read something the others are told of."""
+    low = {"body": "bed", "quantity": "acceleration", "frequency_limit": "1 Hz"}
+    tables = {"sensor": {"some": read(limit="2 Hz")}}
+    tables.setdefault(table, {})["low"] = low | ({"at": 0.5} if table == "sensor" else {})
+    with pytest.raises(BadInput, match=rf"{table}\.low\.frequency_limit: no mode of bed .* 1\.571 Hz, received 1 Hz"):
+        studies.run(study(beam(), force(3.0, MOTION), **tables))
+    stiff = {"stiff": {"of": "body.bed.youngs_modulus", "values": [0.25, 1.0]}}
+    with pytest.warns(studies.Remark, match=f"{table} low reads 0 in some variants: the first frequency of bed, up to"):
+        studies.run(study(beam(), force(3.0, MOTION), sweep=stiff, **tables))
+
+
 def test_answers_name_the_limit_unless_it_is_swept() -> None:
     sensors = {"deck": read(0.5, limit="30 Hz")}
     given = study(beam(damping_ratio=0.01), force(3.0, MOTION), sensor=sensors)

@@ -24,6 +24,9 @@ from results_schema.store.archive import open_archive
 from studies.commands.cli import main as command
 from studies.protocol.parts import Memory, Variants, Work
 from studies.protocol.study import kind_of
+from studies.reporting.tabulated import table_of
+from studies.results.formatting import quantity
+from studies.results.results import Results
 from tests.studies.every_way import assert_same_archives
 from tests.studies.small import SEPARATED
 
@@ -210,6 +213,7 @@ def test_every_command_reads_archives_of_cells(here: Path, capsys: pytest.Captur
     assert command(["export", "a.nc", "a.csv"]) == 0
     rows = Path("a.csv").read_text(encoding="utf-8").splitlines()
     assert len(rows) == 1 + 3 * open_archive("a.nc").root.sizes["result"] and "smallest_at mass" in rows[0]
+    assert "smallest_at speed (m s-1),smallest_at mass (kg),smallest_at damping,largest" in rows[0]
     capsys.readouterr()
     assert command(["compare", "a.nc", "a.nc"]) == 2
     assert "no variants to compare" in capsys.readouterr().err
@@ -233,3 +237,35 @@ def test_what_cells_cannot_hold_is_refused(text: str, where: str) -> None:
     with pytest.raises(BadInput) as caught:
         studies.run(engine.load(text))
     assert caught.value.where == where or caught.value.where.endswith(f": {where}")
+
+
+def test_tables_have_one_unit_for_a_swept_number(tmp_path: Path) -> None:
+    text = TEXT.replace("[1.0, 4.0, 9.0]", '["3.6 km/h", "14.4 km/h"]').replace("sobol = 300", "sobol = 8")
+    found = studies.run(engine.load(text + KEPT["extremes"]))
+    table, _ = table_of(Results.of(found))
+    np.testing.assert_array_equal(table["largest_at speed (km/h)"], table["speed (km/h)"])
+    np.testing.assert_array_equal(table["largest_at mass (kg)"], found["largest_at"].sel(swept="mass").values.ravel())
+
+
+@pytest.mark.parametrize("kept", ["percentiles", "one cell"])
+def test_answers_of_cells_begin_with_the_limit_and_judge_it(
+    whole: xr.Dataset, here: Path, kept: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As all variants do; the terminal has the percentiles."""
+    ends = [whole[f"quarter_{end}"].transpose("speed", "variant").values for end in ("max", "min")]
+    largest = np.nanmax(np.abs(ends), axis=(0, 2))
+    order, dims = np.argsort(largest), 1 if kept == "percentiles" else 0
+    for limit, count in ((0.5 * largest.min(), 3), (largest[order[1:]].mean(), 1), (2.0 * largest.max(), 0)):
+        text = TEXT.replace("[sweep]", f"[question]\nbending_moment = {float(limit)!r}\n\n[sweep]")
+        first = studies.answer(studies.run(engine.load(text + KEPT[kept])))[0]
+        assert first.startswith("quarter_max: from ") and "Its absolute value exceeds " in first
+        some = f"in some variants of {'all' if count == 3 else count} of 3 cells" if dims else "in some of the variants"
+        assert ("nowhere." in first) if count == 0 else (some in first)
+        last = f", speed {whole.speed.values[order[-1]]:g} m/s."
+        assert first.endswith(last) == (dims == 1 and count == 1)
+    Path("study.toml").write_text(TEXT + KEPT[kept], encoding="utf-8")
+    assert command(["run", "study.toml", "-o", "a.nc"]) == 3
+    shown = " ".join(capsys.readouterr().out.split())
+    assert ("Percentiles of 3 cells" in shown) == (dims == 1) and "50 %" in shown
+    values = open_archive("a.nc").root["percentile"].sel(result="midspan_max", percent=50.0).values.ravel()
+    assert quantity(values.min(), "m") in shown and quantity(values.max(), "m") in shown

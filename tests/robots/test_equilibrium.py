@@ -11,6 +11,8 @@ from engine.robots.march import rest, stretches
 from engine.robots.model import RobotModel, build
 from engine.scene.study import Study
 from results_schema.status import Status
+from studies.commands.preview import preview
+from studies.protocol.study import kind_of
 from studies.results.results import Results
 from studies.robots.findings import answer
 from tests.robots.scenes import drive, marched, rail, scene
@@ -113,3 +115,5 @@ def test_a_study_marks_the_variants_that_fall_over() -> None:
     assert (
         "In 1 of 2 variants a joint cannot hold up what stands on it and falls over, as at stiffness 157 N m" in answers
     )
+    (remark,) = preview(kind_of(study).parts(study), 1).remarks
+    assert remark.startswith("1 of 2 variants that were tried fall over")

@@ -212,6 +212,19 @@ def test_the_lines_at_the_end_say_which_variants_they_are_of(fine: Outcome, caps
     assert "most of all for midspan_max: 9e-1 where" in told and f"was asked). {helps} tolerance. Accuracy: " in told
 
 
+def test_errors_within_several_tolerances_are_said_to_be_within_their_own(fine: Outcome) -> None:
+    """ "At most 1.6e-3 where 1e-3 to 1e-2 was asked" would read as if one were missed."""
+    results = fine.results.copy(deep=True)
+    asked, held = results["tolerance"].values, np.isfinite(results["tolerance"].values)
+    asked[np.flatnonzero(held)[0]] *= 10.0
+    span = f"{scientific(float(np.nanmin(asked)))} to {scientific(float(np.nanmax(asked)))}"
+    assert f", each within its own tolerance ({span}); " in told_accuracy(fine.audit, Results.of(results))
+    error = results["estimated_error"].transpose(..., "result").values
+    error[0, 0, np.flatnonzero(held)[-1]] = 2.0 * float(asked[np.flatnonzero(held)[-1]])
+    results["estimated_error"] = results["estimated_error"].transpose(..., "result").copy(data=error)
+    assert f"where {span} was asked; " in told_accuracy(fine.audit, Results.of(results))
+
+
 def test_the_command_says_it_and_ends_with_3(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write(here, SMALL.replace('"auto"\naudit = 2', "200\naudit = 5\ntolerance = 1e-7"))
     assert main(["run", "small.toml", "-v"]) == 3

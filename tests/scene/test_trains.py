@@ -174,6 +174,7 @@ def test_one_variant_as_a_study_of_its_own() -> None:
         ("spacing = 2.0", "spacing = [2.0, -1.0]", ["train.tram.spacing.1", "> 0"]),
         ("spacing = 2.0", 'spacing = "2 kg"', ["train.tram.spacing", "a length (m)"]),
         ('force = "10 kN"', 'force = ["10 kN", 5]', ["train.tram", "force", "3 numbers", "2 numbers"]),
+        ('force = "10 kN"', 'force = ["10 kN"]', ["train.tram", "a list with one", "received a list of 1 number"]),
         ('on = "bed"', 'on = "bad"', ["train.tram.on", '"bed"']),
         ('"force"', '"body"', ["train.tram.kind", "force, mass, oscillator"]),
         ("end = 15\n", "end = 0\n", ["train.tram.motion.end", "train.tram.motion.start = 0"]),
@@ -218,6 +219,24 @@ def test_words(old: str, new: str, words: list[str]) -> None:
     with pytest.raises(BadInput) as error:
         expand(load(TEXT.replace(old, new, 1)))
     assert all(word in str(error.value) for word in words), str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("path", "words"),
+    [
+        (
+            "train.tram.force",
+            ['"train.tram.force.0" to "train.tram.force.2"', '"train.tram.load_scale" multiplies all'],
+        ),
+        ("train.tram.spacing", ['"train.tram.spacing.0" to "train.tram.spacing.1"']),
+    ],
+)
+def test_who_sweeps_a_list_is_told_of_its_numbers(path: str, words: list[str]) -> None:
+    own = {"kind": "force", "on": "bed", "force": [2e4, 1e4, 1e4], "spacing": [0.2, 0.1], "motion": WAY}
+    with pytest.raises(BadInput) as caught:
+        expand(train(own, sweep={"load": {"of": path, "values": [1.0, 2.0]}}))
+    assert all(word in str(caught.value) for word in ["sweep.load.of", *words]), str(caught.value)
+    assert ("load_scale" in str(caught.value)) == (path == "train.tram.force")
 
 
 @pytest.mark.parametrize(

@@ -251,6 +251,11 @@ class Frame(Body):
         return HELD_AT[support] if isinstance(support, str) else support
 
     @property
+    def track_ends(self) -> tuple[str, ...]:
+        (first, first_turned), (last, last_turned) = self.line.members[0], self.line.members[-1]
+        return self.member[first].nodes[int(first_turned)], self.member[last].nodes[int(not last_turned)]
+
+    @property
     def is_one_span(self) -> bool:
         sprung = {one.node for one in self.spring.values() if one.to is None and any(one.stiffness)}
         held = sprung | {node for node in self.supports if set(self.holds(node)) & set(DIRECTIONS[:3])}

@@ -136,6 +136,11 @@ class Body(SpecOfKind):
         """What it looks like; modal: the body with its modes."""
         return straight(modal)
 
+    @property
+    def track_ends(self) -> tuple[str, ...]:
+        """The names of the nodes where its track begins and ends, in this order, if they have names."""
+        return ()
+
     def spot_place(self, spot: Spot) -> Array | None:
         """(3,) where a sensor reads off its track, m, in the coordinates of its outline; None where that is unknown."""
         return None
