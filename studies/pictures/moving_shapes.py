@@ -65,7 +65,7 @@ def scene_pieces(scene: Layout, amplitudes: Array) -> list[Piece]:
         found += body_pieces(body, amplitudes[body.part.modes])
     size = BLOCK * float(np.ptp(scene.points, axis=0).max())
     for number, tie in enumerate(model.carriages):
-        if tie.rides is not None or not model.reacts(number):
+        if tie.rides is not None or tie.name not in scene.positions or not model.reacts(number):
             continue
         modal = model.bodies[tie.body].modal
         place = scene.positions[tie.name]

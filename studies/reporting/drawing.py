@@ -31,7 +31,7 @@ from studies.at_rest.positions import way_of
 from studies.pictures.common.figures import svg
 from studies.pictures.moving_shapes import body_pieces, moving, scene_pieces, view_of_all
 from studies.pictures.scene import pictures
-from studies.pictures.scene_layout import Layout, Placed, in_a_row, layout, starts
+from studies.pictures.scene_layout import Layout, Placed, in_a_row, layout, starts, with_first_at
 from studies.protocol.study import kind_of
 from studies.reporting.report import Drawn, Row, check_folder, page_template
 from studies.results.findings_common import has_dampers, told_trains
@@ -134,11 +134,11 @@ def _of_whole(model: SceneModel) -> Iterator[Shapes]:
         return
     with suppress(BadInput):  # a vehicle that is longer than its body never stands on it with all its contacts
         low, high = way_of(model.study)
-        first, positions = model.carriages[0].name, starts(model)
+        first = model.carriages[0].name
         passes = model.study.carriage[first].motion.passes
-        place = 0.5 * (low + high) if passes else min(max(positions[first], low), high)
+        place = 0.5 * (low + high) if passes else min(max(starts(model)[first], low), high)
         found = coupled_modes(model, VariantValues(model.study, {}, 1), frozen(model, np.array([place])), SHOWN)
-        scene = layout(model, positions | {first: place})
+        scene = layout(model, with_first_at(model, place))
         known = np.flatnonzero(np.isfinite(found.omega[0, 0]))
         shapes = [scene_pieces(scene, found.shapes[0, 0, :, mode]) for mode in known]
         view, shown = view_of_all(shapes), []
@@ -146,9 +146,10 @@ def _of_whole(model: SceneModel) -> Iterator[Shapes]:
             hertz = float(found.omega[0, 0, mode]) / (2.0 * np.pi)
             picture = moving(shape, view, f"mode {mode + 1} of the whole")
             shown.append(Row(f"mode {mode + 1}", f"{number(hertz)} Hz", picture))
+        behind = ", the other axles of its train in their row" * (first in model.study.axles)
         note = (
-            f"Bodies and carriages together, undamped, with {first} at {number(place, 4)} m of its track; motions "
-            "that nothing resists are left out."
+            f"Bodies and carriages together, undamped, with {first} at {number(place, 4)} m of its track{behind}; "
+            "motions that nothing resists are left out."
         )
         yield Shapes("Mode shapes of the whole with its carriages", note, shown)
 

@@ -295,9 +295,11 @@ def _row(results: Results, path: str, value: Any, swept: Mapping[str, str]) -> R
 
 
 def _in_words(results: Results, path: str, value: Any) -> str:
-    """A value of the study file with its unit, which texts have already; tables in a list with those of their own."""
+    """A value of the study file with its unit, which texts have already; what is listed with those of its own."""
     if isinstance(value, list | tuple) and any(isinstance(item, dict) for item in value):
         return "; ".join(_in_words(results, f"{path}.{place}", item) for place, item in enumerate(value))
+    if isinstance(value, list | tuple) and any(isinstance(item, str) for item in value):
+        return ", ".join(_in_words(results, path, item) for item in value)
     if isinstance(value, dict):
         return ", ".join(f"{key} {_in_words(results, f'{path}.{key}', item)}" for key, item in value.items())
     if isinstance(value, str):
