@@ -66,7 +66,7 @@ def test_the_answer_tells_of_limits_that_hold_always_never_and_here_and_there(li
         "acceleration 1. Beyond it: portal up to 0.9 mm and hanging up to 1 mm."
     ]
     assert told(line, [0.1, 0.6, 0.1, 0.2], [np.nan] * 4) == [
-        "Every tool stays within 0.5 mm of its plan in moves at acceleration 0.5 and 2 to 3 alone. "
+        "Every tool stays within 0.5 mm of its plan in moves only at acceleration 0.5 and 2 to 3. "
         "Beyond it: portal up to 0.6 mm."
     ]
     assert told(line, [np.nan] * 4, [np.nan] * 4) == [
