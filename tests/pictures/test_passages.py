@@ -14,6 +14,7 @@ from studies.findings.in_step import speeds_in_step
 from studies.pictures.common.figures import VERMILION, Figure
 from studies.reporting import answers
 from studies.reporting.report import MOST_OPEN
+from studies.results.formatting import listed, number, quantity
 from studies.results.results import Results
 from studies.runs import datasets
 from studies.runs.archived import results_of
@@ -146,6 +147,11 @@ def test_speeds_at_which_axles_push_in_step_are_marked() -> None:
     for axes in figure.drawing.axes[:4]:
         marks = [float(np.asarray(line.get_xdata())[0]) for line in axes.get_lines() if line.get_linestyle() == ":"]
         assert marks == pytest.approx([3.6 * one.speed for one in strongest])
+    dotted = [
+        f"{number(3.6 * one.speed, 4)} km/h (tram, every {quantity(one.way, 'm')} with {number(one.frequency)} Hz)"
+        for one in sorted(strongest)
+    ]
+    assert f"Dotted: axles in step with a frequency of the body without them, {listed(dotted)}." in figure.caption
     (legend,) = figure.drawing.legends
     assert [text.get_text() for text in legend.get_texts()] == ["axles in step with a frequency"]
     assert not [one for one in figures(run("")).values() if one.drawing.legends and one.name != "response"]

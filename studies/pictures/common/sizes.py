@@ -189,7 +189,7 @@ def _told_in_step(seen: View) -> str:
     assert seen.x is not None
     told = [
         f"{seen.x.in_words(x / seen.x.factor)} ({name}, every {quantity(one.way, 'm')} with {number(one.frequency)} Hz)"
-        for x, name, one in _in_step(seen)
+        for x, name, one in sorted(_in_step(seen))
     ]
     return f"Dotted: {IN_STEP} of the body without them, {listed(told)}." if told else ""
 
