@@ -34,7 +34,7 @@ def remarks(plan: Plan) -> list[str]:
 
 def _partly_inert(plan: Plan) -> Iterator[str]:
     """Of the scene without sweep."""
-    if sentence := told_of(plan.base):
+    if sentence := told_of(plan.base, of_loads=True):
         yield sentence
 
 
