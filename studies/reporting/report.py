@@ -202,23 +202,22 @@ def _soft(text: str) -> Markup:
 
 
 def _minus(text: str) -> str:
-    """Numbers with a true minus sign, at which no line ends, and on one line with their unit.
+    """Numbers with a true minus sign, and on one line with their unit.
 
-    >>> _minus("1.9e-5 m").replace("\N{NO-BREAK SPACE}", "_").replace("\N{MINUS SIGN}", "~")
-    '1.9e~5_m'
     >>> _minus("-1.5 kN m at 12 % of 3 m/s, 2 modes").replace("\N{NO-BREAK SPACE}", "_").replace("\N{MINUS SIGN}", "~")
     '~1.5_kN_m at 12_% of 3_m/s, 2 modes'
     """
-    text = re.sub(r"(?:(?<![\w.-])|(?<=\de))-(?=\d)", "\N{MINUS SIGN}", text)
+    text = re.sub(r"(?<![\w.-])-(?=\d)", "\N{MINUS SIGN}", text)
     return UNIT.sub("\N{NO-BREAK SPACE}", text)
 
 
 def _unbroken(text: str) -> str:
-    """A value that breaks between it and its error alone.
+    """A value that breaks between it and its error alone; lines end behind hyphens, but not at a minus sign.
 
-    >>> _unbroken("1.5 kN m ± 2 N m").replace("\N{NO-BREAK SPACE}", "_")
-    '1.5_kN_m ±_2_N_m'
+    >>> _unbroken("1.5 kN m ± 2e-5 N m").replace("\N{NO-BREAK SPACE}", "_").replace("\N{MINUS SIGN}", "~")
+    '1.5_kN_m ±_2e~5_N_m'
     """
+    text = re.sub(r"(?<=\de)-(?=\d)", "\N{MINUS SIGN}", text)
     return text.replace(" ", "\N{NO-BREAK SPACE}").replace("\N{NO-BREAK SPACE}±", " ±")
 
 

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from studies.reporting.drawing import write_drawing
-from studies.reporting.report import _minus, write_report
+from studies.reporting.report import _unbroken, write_report
 from tests.pictures.test_report import archive, check_standing_alone, plain
 from tests.studies import scenes
 
@@ -44,4 +44,4 @@ def test_on_paper_accuracy_is_printed_and_the_study_file_is_not(tmp_path: Path) 
 
 def test_lines_do_not_end_within_numbers() -> None:
     """A hyphen would be such a place, a minus sign is none."""
-    assert "-" not in _minus("0.5 to 1.9e-5 m/s² and -3e-4") and "e-x" in _minus("tube-x, pipe-x")
+    assert "-" not in _unbroken("0.5 m/s² ± 1.9e-5 m/s²") and "e-x" in _unbroken("pipe-x")

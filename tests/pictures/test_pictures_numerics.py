@@ -221,4 +221,4 @@ def test_the_report_has_them_all(plane: xr.Dataset, tmp_path: Path) -> None:
         assert plain(figure.title) in plain(reader.text) and plain(figure.caption) in plain(reader.text)
         assert len(list(page.parent.glob(f"*-{figure.name}.png"))) == 1
     for sentence in told_choices(Results.of(dataset)):
-        assert plain(sentence) in plain(reader.text)
+        assert sentence in reader.text
