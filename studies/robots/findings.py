@@ -28,14 +28,16 @@ def answer(results: Results) -> list[str]:
     statuses."""
     missed = list(told_missed(results))
     others = {status for status, count in results.status_counts.items() if count and status != Status.OK}
-    held, front = list(_held(results)), list(_front(results))
+    held = list(_held(results))
     works = np.isfinite(results.dataset["error_working"]).any()
     return [
         *told_limits(results),
         *_falls(results),
         *missed,
-        *([*front, *held] if works else [*held, *front]),
+        *([] if works else held),
+        *_front(results),
         *_errors(results),
+        *(held if works else []),
         *_statics(results),
         *_deflections(results),
         *_causes(results),

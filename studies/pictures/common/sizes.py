@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
+from engine.scene.study import Study
 from engine.scene.trains import axle_name
 from studies.findings.amplification import largest, size_errors, sizes
 from studies.findings.effects import HARDLY
@@ -196,17 +197,31 @@ def _told_in_step(seen: View) -> str:
 
 def _in_step(seen: View) -> list[tuple[float, str, InStep]]:
     """Speeds, as along the horizontal axis, at which axles of trains push in step, with their train, the strongest of
-    each, whatever the figure reads; none where the archive's bodies are not at hand."""
+    each, whatever the figure reads; none without the archive's bodies, or where curves are of several trains."""
     results, axis, found = seen.results, seen.x, list[tuple[float, str, InStep]]()
     assert axis is not None
     for name, train in results.study.train.items():
         factor = axis.targets.get(f"carriage.{axle_name(name, 0)}.motion.speed")
-        if factor is not None and train.on in results.models:
+        study = _with_held(seen, name)
+        if factor is not None and study is not None and train.on in results.models:
             between = factor * float(axis.values.min()), factor * float(axis.values.max())
-            told = speeds_in_step(results.study, name, results.models[train.on], between, results.study.sensor.values())
+            told = speeds_in_step(study, name, results.models[train.on], between, study.sensor.values())
             strongest = sorted(told, key=lambda one: one.swing)[-MOST_MARKED:]
             found += [(one.speed / factor * axis.factor, name, one) for one in strongest]
     return found
+
+
+def _with_held(seen: View, train: str) -> Study | None:
+    """The study with the distances of a train that the view holds; None where it shows several, or cannot have them."""
+    results, held = seen.results, dict[str, float]()
+    for axis in results.axes:
+        own = [path for path in results.study.sweep.axes[axis.name].of if path.startswith(f"train.{train}.spacing")]
+        if own and axis.dim not in seen.held:
+            return None
+        held |= {path: float(axis.values[seen.held[axis.dim]]) for path in own}
+    if held and any(results.recorded(body) is not None for body in results.study.body):
+        return None  # it is built anew, for which files would be needed
+    return results.study.without_sweep().with_values(held) if held else results.study
 
 
 def _draw_sizes(axes: Axes, seen: View, sensor: str, limit: float | None) -> None:
