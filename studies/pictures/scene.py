@@ -24,9 +24,8 @@ MOST_NAMED = 16  # nodes of a body, and carriages
 FEW_LINES = 30  # that are drawn bold
 ON_TRACK, ASIDE = 21, 1e-3  # places of a track that are looked at, and of its length: what lies beside lines
 COLOURS = (BLUE, PURPLE, SKY)  # of bodies
-IN_MOTION = (
-    " Frames that move, their springs and loads, and robots (dark orange, the tool a triangle) are as at time 0."
-)
+FRAMES = " Frames that move, their springs and loads are as at time 0."
+ROBOTS = " Robots (dark orange, the tool a triangle) are as at time 0."
 AXES, ENDS = np.eye(3), np.array([-1.0, 1.0])
 
 # Symbols as curves between two ends: (part of the way, symbol sizes beside it).
@@ -102,7 +101,7 @@ def _picture(scene: Layout, view: Array) -> Figure:
     rows = in_rows(above, ends), in_rows(below, ends)
     top, bottom = (max((one.row + 1.3 for one in found), default=0.3) * step for found in rows)
     study = scene.model.study
-    moving = IN_MOTION * any((study.frame, study.load, study.spring, study.robot))
+    moving = FRAMES * any((study.frame, study.load, study.spring)) + ROBOTS * bool(study.robot)
     caption = f"To scale, in metres; symbols are not.{_legend(scene)}{moving}"
 
     def fill(drawing: Drawing) -> None:

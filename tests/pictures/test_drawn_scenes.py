@@ -15,6 +15,7 @@ from studies.pictures.scene_names import Label, in_rows, write
 from studies.reporting.drawing import page_of
 from tests.bodies.frames import PINNED, straight
 from tests.engine.build import Table, beam, cruise, fixed, mass, study
+from tests.robots.scenes import scene
 
 CAR = mass(0.1, cruise(0.0, 1.0, 1.0))
 
@@ -58,6 +59,12 @@ def test_captions_tell_what_is_there() -> None:
     assert "Carriages (dark orange) stand where they start" in both and "green: sensors" in both
     assert "dashed" not in both and "red" not in both
     assert "sensors" not in drawn(study(beam(), {"car": CAR}, sensor={})).caption
+
+
+def test_robots_alone_are_no_frames_that_move() -> None:
+    caption = drawn(scene()).caption
+    assert "Robots (dark orange, the tool a triangle) are as at time 0." in caption
+    assert "Frames that move" not in caption and "Carriages" not in caption
 
 
 def test_columns_in_which_nothing_stands_are_left_out() -> None:
