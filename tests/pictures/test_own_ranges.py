@@ -100,3 +100,15 @@ def test_one_place_is_not_told_twice() -> None:
     dataset["dynamic_amplification"].values[(top[0], 1 - top[1])] = 1.5
     said = next(text for text in answers.answer(dataset) if text.startswith("midspan"))
     assert "relative to statics" not in said and "1.5 times the static" in said
+
+
+def test_level_lines_are_a_sentence() -> None:
+    """Of sizes and amplifications that are the same all over, below another figure; drawn where there is a limit."""
+    for question, is_drawn in (("", False), ('[question]\ndisplacement = "8 mm"', True)):
+        dataset = passage([7.7, 7.701, 7.7, 7.701], question)
+        dataset["dynamic_amplification"].values[:] = 1.0
+        found = {figure.name: figure for figure in answers.figures(dataset)}
+        assert ("largest-displacement" in found) == is_drawn
+        words = "Not drawn: midspan, 7.7 mm, the same within 1 % for pace 1 m/s to 8 m/s."
+        words += " Dynamic amplification of midspan: 1 throughout."
+        assert any(words in figure.caption for figure in found.values()) != is_drawn

@@ -70,6 +70,15 @@ def sizes_of(seen: View, sensors: list[str], limit: float | None, top: Index) ->
     return telling_limits(draw(name, _title(results, sensors[0], limit, top), caption, 0.9 + 1.9 * len(shown), fill))
 
 
+def told_flat(seen: View, sensors: list[str], limit: float | None) -> str:
+    """The sizes of sensors, and their amplification, as sentences, where a figure of them would have no more than level
+    lines; "" where it shows something."""
+    if limit is not None or not all(_is_flat(seen, name) and not _has_gain(seen, name) for name in sensors):
+        return ""
+    told = (text for name in sensors for text in (_told_flat(seen, name), _told_gain(seen, name)))
+    return " ".join(filter(None, told))
+
+
 def _is_flat(seen: View, sensor: str) -> bool:
     """Whether the sizes of a sensor change along the horizontal axis by no more than an eye sees; not of samples."""
     assert seen.x is not None
