@@ -111,7 +111,7 @@ def _limits(plan: Plan) -> dict[str, tuple[str, Array, Array]]:
 
 def _partly_inert(plan: Plan) -> Iterator[str]:
     """Of the scene without sweep."""
-    if sentence := told_of(plan.base):
+    if sentence := told_of(plan.base, of_loads=True):
         yield sentence
 
 

@@ -106,7 +106,7 @@ def standing(timeline: Timeline, counts: Array | Counts) -> Along:
 def frozen(model: SceneModel, places: Array) -> Along:
     """The ways of all riders at rest, with the first carriage at `places` (S,) in m along its track, the other axles of
     its train behind it, and every other one where it starts; whoever is off the body does not touch it."""
-    along = [_standing(model, carriage.name, places) for carriage in model.carriages]
+    along = [in_row(model, carriage.name, places) for carriage in model.carriages]
     owners = {load.rider: number for number, carriage in enumerate(model.carriages) for load in carriage.loads}
     still, found = np.zeros_like(places), []
     for number, rider in enumerate(model.riders):
@@ -118,7 +118,7 @@ def frozen(model: SceneModel, places: Array) -> Along:
     return tuple(found)
 
 
-def _standing(model: SceneModel, name: str, places: Array) -> Array:
+def in_row(model: SceneModel, name: str, places: Array) -> Array:
     """(S,) where a carriage stands while the first is at `places`: axles keep their distances."""
     trains, first, carriage = model.study.axles, model.carriages[0].name, model.study.carriage[name]
     start, end = (float(carriage.motion.path(tau).S) for tau in (0.0, carriage.motion.duration))

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from engine.model.scene_model import UNFELT
 from engine.model.station_path import frozen
 from engine.model.ties import PushTie
 from engine.scene.carriages import Carriage
 from engine.scene.references import check_inertia
 from engine.scene.variants import VariantValues
-from engine.statics.coupled_modes import coupled_frequencies
+from engine.statics.coupled_modes import CoupledModes, coupled_modes
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 LOWER = 1e-3  # relative: a frequency that would be lower by more is told
 LOWEST, PLACES = 6, 5  # frequencies that are looked at, and places of the first carriage
+ALONG = 33  # places of a track
 
 
 def left_out(study: Study) -> dict[str, tuple[Direction, ...]]:
@@ -78,12 +80,32 @@ def told(study: Study, places: Array, now: Array, then: Array) -> str:
     return f"{masses}: if it did ({keys}), {would}, with {next(iter(study.carriage))} at {places[place]:.4g} m"
 
 
-def told_of(model: SceneModel) -> str:
-    """The same of a scene, looked at in some places of the first carriage's way."""
+def told_of(model: SceneModel, of_loads: bool = False) -> str:
+    """The same of a scene, looked at in some places of the first carriage's way. of_loads: only where frequencies of
+    shapes that loads push would be lower, as sensors without a direction tell of no others, such as those along a
+    straight bridge."""
     whole, rider = in_all_directions(model), model.carriages[0].rider
     if whole is model:
         return ""
     low, high = np.clip(rider.range, 0.0, rider.length)
     places, values = np.linspace(low, high, PLACES), VariantValues(model.study, {}, 1)
-    now, then = (coupled_frequencies(one, values, frozen(one, places), LOWEST)[0] for one in (model, whole))
-    return told(model.study, places, now / (2.0 * np.pi), then / (2.0 * np.pi))
+    now, then = (coupled_modes(one, values, frozen(one, places), LOWEST) for one in (model, whole))
+    sideways = any(one.direction is not None or one.point is not None for one in model.study.sensor.values())
+    if of_loads and not sideways:
+        pushed, would_be = _pushed(model, now), _pushed(whole, then)
+        if not told(model.study, places, pushed, would_be):
+            return ""
+    return told(model.study, places, now.omega[0] / (2.0 * np.pi), then.omega[0] / (2.0 * np.pi))
+
+
+def _pushed(model: SceneModel, found: CoupledModes) -> Array:
+    """(P, K) Hz: the frequencies of shapes that move a track as its loads push, or a sprung mass; NaN behind these."""
+    shapes, moved = found.shapes[0], np.zeros(found.omega[0].shape)
+    for part in model.bodies:
+        track = part.modal.shape(np.linspace(0.0, part.modal.length, ALONG))
+        moved = np.maximum(moved, np.abs(np.einsum("sn,pnk->psk", track, shapes[:, part.modes])).max(axis=1))
+    sprung = slice(model.body_modes, model.body_modes + len(model.sprung))
+    moved = np.maximum(moved, np.abs(shapes[:, sprung]).max(axis=1, initial=0.0))
+    with np.errstate(invalid="ignore"):
+        felt = moved > UNFELT * np.nanmax(moved)
+    return np.sort(np.where(felt, found.omega[0], np.nan), axis=1) / (2.0 * np.pi)

@@ -276,8 +276,8 @@ def _in_step(plan: Plan) -> Iterator[TextTable]:
             )
             for one in found
         ]
-        alone = " without the masses on it" if study.carriage[axle].inertial else ""
-        heading = f"Speeds at which {name} pushes in step with one of the first frequencies of {train.on}{alone}"
+        alone = f", of {train.on} without masses on it" if study.carriage[axle].inertial else ""
+        heading = f"Speeds at which axles of {name} push in step with a frequency{alone or f' of {train.on}'}"
         yield TextTable(
             heading, ("speed", "frequency", "way in a period", "part of its load", "swing of its mode"), rows
         )

@@ -18,6 +18,7 @@ from results_schema.quantities import QUANTITIES
 #: Speeds that are looked at between the lowest and the highest, and the part of a train's load that has to push in
 #: step to be told: a bogie of two axles does so far from any resonance of the whole train.
 LOOKED_AT, TOLD_IN_STEP = 4096, 0.3
+FEWEST = 3  # axles: what one or two pushes leave is no resonance
 MODES, MOST = 4, 8  # that are looked at, the lowest that move the track; speeds that are told
 LEAST = 0.05  # of the largest swing: what is less builds up to nothing
 ACCELERATION, NO_DECAY = 2, 1e-12  # order by time
@@ -46,9 +47,9 @@ def speeds_in_step(
     """Where much of a train's load pushes in step with one of the first frequencies of its body, the highest speed
     first: at most eight, at which that mode swings most. body: as its archive tells it. readers: where some read
     accelerations of that body these count, of modes up to their frequency limits, else displacements. None of a train
-    that starts and stops, whose axles never come in one rhythm for long."""
+    that starts and stops, whose axles never come in one rhythm for long, or of two axles."""
     train, found, speeds = study.train[name], list[InStep](), np.geomspace(*between, LOOKED_AT)
-    if not train.motion.passes:
+    if not train.motion.passes or train.count < FEWEST:
         return []
     of_body = [one for one in readers if one.body == train.on]
     read = [one for one in of_body if QUANTITIES[one.quantity].rate == ACCELERATION]

@@ -102,9 +102,8 @@ def _largest(results: Results, sensor: str) -> str:
         return f"{sensor}: no variant has values."
     opened = "while the contact holds, " if results.held.any() else "with a contact that opens in every variant, "
     shown = "" if results.held[results.kept.values].all() else opened
-    said = (
-        f"{sensor}: {shown}the largest {results.noun(sensor)} {results.place(sensor)} is {_value(results, sensor, top)}"
-    )
+    value = _value(results, sensor, top)
+    said = f"{sensor}: {shown}the largest {results.noun(sensor)} {results.place(sensor)} is {value}"
     if same := unchanged(results, sizes(results, sensor)):
         return f"{said} and {same}."
     where = f"{in_words(results, top)}{_at_the_end(results, top)}"
@@ -113,13 +112,11 @@ def _largest(results: Results, sensor: str) -> str:
     static = sizes(results, sensor)[best] / gain[best]
     amplified = times(float(gain[best]), f"the static {quantity(float(static), results.sensors[sensor])}")
     amplified += with_own_weight(results.study, sensor)
-    if best == top:
+    there = f"{in_words(results, best)}{_at_the_end(results, best)}"
+    if best == top or there == where:
         return f"{said}, {amplified}{where and f',{where}'}."
     loosely = uncertainty(results, f"dynamic_amplification {sensor}", best)
-    return (
-        f"{said}{where}; relative to statics it is largest{in_words(results, best)}{_at_the_end(results, best)}: "
-        f"{amplified}{loosely}."
-    )
+    return f"{said}{where}; relative to statics it is largest{there}: {amplified}{loosely}."
 
 
 def _effects(results: Results, envelopes: list[str], sensors: list[str]) -> str:
@@ -156,7 +153,8 @@ def _amplified_besides(results: Results, told: str) -> str:
         return ""
     words = [f"{name} (up to {number(most[name])})" for name in beyond[:MOST_TOLD]]
     words += [f"{len(beyond) - MOST_TOLD} more"] * (len(beyond) > MOST_TOLD)
-    return f" Of the other sensors {listed(words)} exceed{'s' * (len(beyond) == 1)} {number(threshold)}."
+    exceed = f"exceed{'s' * (len(beyond) == 1)} a dynamic amplification of {number(threshold)}"
+    return f" Of the other sensors {listed(words)} {exceed}."
 
 
 def _limited(results: Results, sensor: str) -> str:
@@ -190,7 +188,8 @@ def _value(results: Results, sensor: str, place: Index) -> str:
     at = float(results.dataset[f"{sensor}_{side}_position"].values[place])
     then = f" with {results.carriage_name} at {quantity(at, 'm')}" if np.isfinite(at) else ""
     loosely = uncertainty(results, f"{sensor}_{side}", place)
-    return f"{quantity(sides[side], results.sensors[sensor])}{loosely}{then}"
+    size = " in magnitude" * (sides[side] < 0.0)
+    return f"{quantity(sides[side], results.sensors[sensor])}{size}{loosely}{then}"
 
 
 def _contact_forces(results: Results) -> Iterator[tuple[str, Array]]:

@@ -58,6 +58,23 @@ def body_pieces(body: Placed, amplitudes: Array) -> Iterator[Piece]:
         yield Piece(body.at(line.points), line.motion @ amplitudes @ body.turn.T, dots)
 
 
+def unseen(pieces: Sequence[Piece], largest: float) -> str:
+    """Why nothing is seen of a shape: it moves along its own lines alone, or moves none of them, beside what moves by
+    so much elsewhere; "" where something is seen."""
+    across = along = 0.0
+    for piece in pieces:
+        if piece.dots or len(piece.points) < 2:
+            return ""
+        way = np.gradient(piece.points, axis=0)
+        way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), np.finfo(float).tiny)
+        own = (piece.motion * way).sum(axis=1, keepdims=True)
+        across = max(across, float(np.linalg.norm(piece.motion - own * way, axis=1).max()))
+        along = max(along, float(np.abs(own).max()))
+    if across > STILL * max(along, STILL * largest):
+        return ""
+    return "along the member: nothing to see across" if along > STILL * largest else "twists: no line moves"
+
+
 def scene_pieces(scene: Layout, amplitudes: Array) -> list[Piece]:
     """All bodies and carriages by the modes of all bodies and of sprung masses (N,)."""
     model, found = scene.model, list[Piece]()
@@ -65,7 +82,7 @@ def scene_pieces(scene: Layout, amplitudes: Array) -> list[Piece]:
         found += body_pieces(body, amplitudes[body.part.modes])
     size = BLOCK * float(np.ptp(scene.points, axis=0).max())
     for number, tie in enumerate(model.carriages):
-        if tie.rides is not None or not model.reacts(number):
+        if tie.rides is not None or tie.name not in scene.positions or not model.reacts(number):
             continue
         modal = model.bodies[tie.body].modal
         place = scene.positions[tie.name]

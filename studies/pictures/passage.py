@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial, reduce
 from typing import Any
 
@@ -17,7 +18,7 @@ from studies.pictures.common import figures as look
 from studies.pictures.common import residual
 from studies.pictures.common.figures import Figure, colour_bar, draw, legend_beside, zero_line
 from studies.pictures.common.response import response
-from studies.pictures.common.sizes import gain, sizes_of, speed_ratio
+from studies.pictures.common.sizes import gain, sizes_of, speed_ratio, told_flat
 from studies.pictures.common.sweep_view import (
     DAMPING,
     MOST_CURVES,
@@ -49,12 +50,15 @@ def pictures(results: Results) -> list[Figure]:
     if not sensors:
         return []
     top = _top(results, sensors[0])
-    seen, first, others = _view(results, top), list[Figure](), list[Figure]()
+    seen, first, others, level = _view(results, top), list[Figure](), list[Figure](), list[str]()
     if seen.x is not None:
         for name in dict.fromkeys(results.study.sensor[sensor].quantity for sensor in sensors):
             own = [sensor for sensor in sensors if results.study.sensor[sensor].quantity == name]
             if all(unchanged(results, sizes(results, sensor)) for sensor in own):
                 continue  # the findings say so
+            if said := told_flat(_view(results, _top(results, own[0])), own, limits.limit(name)):
+                level.append(said)
+                continue
             asked = not first or limits.limit(name) is not None
             (first if asked else others).append(_sizes(results, own, limits.limit(name)))
         if seen.y is not None and len(seen.y.values) > MANY and _is_telling(seen, gain(results, sensors[0])):
@@ -64,7 +68,10 @@ def pictures(results: Results) -> list[Figure]:
     size = np.where(results.with_values, sizes(results, sensors[0]), np.nan)
     shown = picked(results, size, MOST_HISTORIES)
     on_the_way = [response(results, sensors, limits, shown, top)] if shown else []
-    return [*residual.pictures(results, limits.residual), *first, *on_the_way, *others]
+    found = [*first, *on_the_way, *others]
+    if level and found:
+        found[0] = replace(found[0], caption=" ".join([found[0].caption, *level]))
+    return [*residual.pictures(results, limits.residual), *found]
 
 
 def _top(results: Results, sensor: str) -> Index:

@@ -38,7 +38,8 @@ from studies.robots.tolerance_missed import model_of
 MOST_ROBOTS, MOST_SHAPES, MOST_NAMES, MOST_FRAMES, MOST_MARKED = 6, 4, 3, 40, 12
 SIZE = 0.4  # of the distance between rails as drawn: how large the largest deflection is drawn at most
 ROWS_APART = 0.07  # of the longest rail, between two as drawn
-COMPONENTS = ("x", "y", "z")
+COMPONENTS, UP = ("x", "y", "z"), 2
+UNSEEN = 1e-4  # of the largest error: components of it that are no panel
 ALIKE = 0.01  # of the longest: times that are one
 
 
@@ -93,7 +94,8 @@ def _draw_front(results: Results, words: str, error: Array, cycle: Array, drawin
 def _along_sweep(results: Results) -> list[Figure]:
     """What tools are off their plan over the swept number with the most values, with limits; [] without a sweep."""
     axis, limited = longest_axis(results), {limit.name: limit for limit in limits(results)}
-    asked = dict.fromkeys(("error_moving", "error_working", *limited))
+    works = np.isfinite(results.dataset["error_working"]).any()
+    asked = dict.fromkeys(("error_moving", "error_working" if works else "error_holding", *limited))
     rows = {name: limited.get(name) for name in asked if np.isfinite(results.dataset[name]).any()}
     if axis is None or not rows:
         return []
@@ -132,41 +134,53 @@ def _draw_along(seen: View, rows: Mapping[str, Limit | None], drawing: Drawing) 
     legend_of_all(drawing, every[0])
 
 
+def _at(results: Results, index: Index) -> str:
+    """The variant that a figure shows, as the first sentence of its caption."""
+    at = results.at(index)
+    return f"At {at}. " if at else ""
+
+
 def _strip(results: Results, index: Index) -> Figure:
     largest = results.dataset["error_moving"].values[index]
     worst = int(np.nanargmax(np.nan_to_num(largest, nan=-1.0)))
     name = list(results.study.robot)[worst]
     title = f"The tool of {name} is off by up to {quantity(float(largest[worst]), 'm')} while it moves"
-    at = results.at(index)
+    error = np.abs(results.row(results.dataset["tool_centre_point_error"], index))
+    most = np.nanmax(error, axis=(0, 1))
+    shown = [place for place, own in enumerate(most) if own > UNSEEN * most.max()] or [0, 1, 2]
+    still = [COMPONENTS[place] for place in range(len(COMPONENTS)) if place not in shown]
+    less = f" Errors of {listed(still)} are less than {percent(UNSEEN)} of the largest." if still else ""
     caption = (
-        f"{f'At {at}. ' if at else ''}Planned places of the tools, and how far they are off these; up: a payload is "
-        "picked up, down: put down; thick: at work."
+        f"{_at(results, index)}Planned places of the tools, and how far they are off these; up: a payload is "
+        f"picked up, down: put down; thick: at work.{less}"
     )
-    return draw("over time", title, caption, 5.4, partial(_draw_strip, results, index))
+    height = 0.6 + 1.6 * len(shown)
+    return draw("over time", title, caption, height, partial(_draw_strip, results, index, shown))
 
 
-def _draw_strip(results: Results, index: Index, drawing: Drawing) -> None:
+def _draw_strip(results: Results, index: Index, shown: list[int], drawing: Drawing) -> None:
     from engine.robots.results import handled, works
 
     dataset, model = results.dataset, model_of(results, index)
     times = results.row(dataset["elapsed"], index)
     planned, error = (results.row(dataset[name], index) for name in ("tool_centre_point", "tool_centre_point_error"))
     scale = scale_for(float(np.nanmax(np.abs(error))), "m")
-    every = drawing.subplots(len(COMPONENTS), 2, sharex=True)
+    every = drawing.subplots(len(shown), 2, squeeze=False, sharex=True)
     for r, name in enumerate(model.robots[:MOST_ROBOTS]):
         colour, own = DISTINCT[r % len(DISTINCT)], [way for way in works(model) if way.robot == r]
         at_work = np.any([(times >= way.start) & (times <= way.end) for way in own], axis=0) if own else times < 0.0
-        for (place, off), values, wrong in zip(every, planned[:, r].T, error[:, r].T * scale.factor, strict=True):
+        own_rows = zip(every, planned[:, r, shown].T, error[:, r, shown].T * scale.factor, strict=True)
+        for (place, off), values, wrong in own_rows:
             place.plot(times, values, color=colour, linewidth=1.0, label=name)
             off.plot(times, wrong, color=colour, linewidth=0.7)
             off.plot(times, np.where(at_work, wrong, np.nan), color=colour, linewidth=2.0)
         for robot, time, picks_up in handled(model):
-            if robot == r and time <= times[-1]:
-                height = np.interp(time, times, planned[:, r, -1])
+            if robot == r and time <= times[-1] and shown[-1] == UP:
+                height = np.interp(time, times, planned[:, r, UP])
                 every[-1, 0].plot(time, height, "^" if picks_up else "v", color=colour, markersize=5)
-    for (place, off), name in zip(every, COMPONENTS, strict=True):
-        place.set_ylabel(f"planned {name} (m)")
-        off.set_ylabel(f"error of {name} ({scale.unit})")
+    for (place, off), row in zip(every, shown, strict=True):
+        place.set_ylabel(f"planned {COMPONENTS[row]} (m)")
+        off.set_ylabel(f"error of {COMPONENTS[row]} ({scale.unit})")
         zero_line(off)
     for axes in every[-1]:
         axes.set_xlabel("time (s)")
@@ -230,7 +244,8 @@ class _View:
         return np.stack([self.places[rail][known], height], axis=1)
 
     def in_words(self) -> str:
-        return f"{len(self.places)} rails one below another, deflections {self.exaggeration:,.0f} times as large"
+        rails = f"{len(self.places)} rails one below another, " * (len(self.places) > 1)
+        return f"{rails}deflections {self.exaggeration:,.0f} times as large"
 
 
 def _marked(results: Results, index: Index) -> dict[float, list[str]]:
@@ -246,8 +261,13 @@ def _marked(results: Results, index: Index) -> dict[float, list[str]]:
 
 def _shapes(results: Results, index: Index) -> Figure:
     marked, view = _marked(results, index), _View.of(results, index)
-    title = f"The rails bend by up to {quantity(float(np.nanmax(np.abs(view.down))), 'm')}"
-    caption = f"At the times of the longest errors: {view.in_words()}. Bars are robots on their rails, at their tools."
+    under = float(np.nanmax(results.row(results.dataset["deflection_largest"], index)))
+    largest = max(under, float(np.nanmax(np.abs(view.down))))
+    title = f"The rails bend by up to {quantity(largest, 'm')}"
+    caption = (
+        f"{_at(results, index)}At the times of the longest errors: {view.in_words()}. Bars are robots on their rails, "
+        "at their tools."
+    )
     rows = {time: f"{time:.3g} s: {listed(names)} off the most" for time, names in marked.items()}
     height = 0.6 + (0.3 + 6.0 * ROWS_APART * len(view.places)) * len(rows)
     return draw("rails", title, caption, height, partial(_draw_rows, results, index, view, rows))
@@ -318,8 +338,10 @@ def _worst_move(results: Results, index: Index) -> Figure | None:
         robot: np.stack([planned[shown, r, 0], np.full(shown.size, heights[r])], axis=1)
         for r, robot in enumerate(model.robots)
     }
-    title = f"In move {way.number} of {name} its tool is off by up to {quantity(most[way], 'm')}"
-    caption = f"That move again and again, at its own pace: {view.in_words()}. Points are tools."
+    of_all_steps = float(results.row(results.dataset["error_moving"].sel(robot=name), index))
+    off = quantity(max(of_all_steps, most[way]), "m")
+    title = f"In move {way.number} of {name} its tool is off by up to {off}"
+    caption = f"{_at(results, index)}That move again and again, at its own pace: {view.in_words()}. Points are tools."
     at = {float(view.times[during[way][np.argmax(size[during[way], way.robot])]]): f"move {way.number} of {name}"}
     still = draw("worst move", title, caption, 2.2, partial(_draw_rows, results, index, view, at))
     return replace(still, moving=played(frames, marks, way.end - way.start, title))

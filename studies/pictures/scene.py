@@ -22,8 +22,10 @@ WIDE = 1.5  # least width over height of a picture
 SPRING = 3.0  # symbols: half of the length of a spring at most
 MOST_NAMED = 16  # nodes of a body, and carriages
 FEW_LINES = 30  # that are drawn bold
+ON_TRACK, ASIDE = 21, 1e-3  # places of a track that are looked at, and of its length: what lies beside lines
 COLOURS = (BLUE, PURPLE, SKY)  # of bodies
-IN_MOTION = " Frames that move, their springs and loads, and robots (red, the tool a triangle) are as at time 0."
+FRAMES = " Frames that move, their springs and loads are as at time 0."
+ROBOTS = " Robots (dark orange, the tool a triangle) are as at time 0."
 AXES, ENDS = np.eye(3), np.array([-1.0, 1.0])
 
 # Symbols as curves between two ends: (part of the way, symbol sizes beside it).
@@ -99,11 +101,8 @@ def _picture(scene: Layout, view: Array) -> Figure:
     rows = in_rows(above, ends), in_rows(below, ends)
     top, bottom = (max((one.row + 1.3 for one in found), default=0.3) * step for found in rows)
     study = scene.model.study
-    caption = (
-        f"To scale, in metres; symbols are not. {_standing(scene)}; arrows along their ways; green: sensors; dashed: a "
-        "track beside what carries it. What rides is drawn a little above its track."
-        f"{IN_MOTION * any((study.frame, study.load, study.spring, study.robot))}"
-    )
+    moving = FRAMES * any((study.frame, study.load, study.spring)) + ROBOTS * bool(study.robot)
+    caption = f"To scale, in metres; symbols are not.{_legend(scene)}{moving}"
 
     def fill(drawing: Drawing) -> None:
         axes = drawing.subplots()
@@ -120,16 +119,40 @@ def _picture(scene: Layout, view: Array) -> Figure:
     return draw("scene", "The scene to scale", caption, height, fill)
 
 
+def _legend(scene: Layout) -> str:
+    """What is drawn how, as sentences; what is not there is not told."""
+    study = scene.model.study
+    said = [f"{_standing(scene)}; arrows along their ways"] if study.carriage else []
+    said += ["green: sensors"] * bool(study.sensor)
+    said += ["dashed: a track beside what carries it"] * any(_is_aside(body) for body in scene.bodies.values())
+    told = "; ".join(said)
+    above = " What rides is drawn a little above its track." * bool(study.carriage)
+    return f" {told[0].upper()}{told[1:]}.{above}" if told else ""
+
+
+def _is_aside(body: Placed) -> bool:
+    """Whether a part of a body's track lies beside its lines."""
+    track = body.along(body.part.modal.length * np.linspace(0.0, 1.0, ON_TRACK))
+    apart = np.full(ON_TRACK, np.inf)
+    for line in body.outline.lines:
+        start, way = body.at(line.points)[:-1], np.diff(body.at(line.points), axis=0)
+        reach = np.maximum((way**2).sum(axis=1), np.finfo(float).tiny)
+        part = np.clip(((track[:, None] - start) * way).sum(axis=2) / reach, 0.0, 1.0)
+        off = track[:, None] - start - part[..., None] * way
+        apart = np.minimum(apart, np.linalg.norm(off, axis=2).min(axis=1))
+    return bool(apart.max() > ASIDE * body.part.modal.length)
+
+
 def _standing(scene: Layout) -> str:
     """Where carriages stand, as the beginning of a sentence."""
     if not scene.model.study.train:
-        return "Carriages (red) stand where they start, those that follow as far behind as they trail"
+        return "Carriages (dark orange) stand where they start, those that follow as far behind as they trail"
     first = next(iter(scene.model.study.axles))
     hidden = len(scene.model.carriages) - len(scene.positions)
     left_out = f", {counted(hidden, 'axle')} further off left out" if hidden else ""
     stay = not all(carriage.motion.passes for carriage in scene.model.study.carriage.values())
     others = ", those that stay on their bodies as they start" if stay else ""
-    return f"Carriages (red) stand as {first} has come to {number(scene.positions[first])} m{left_out}{others}"
+    return f"Carriages (dark orange) stand as {first} has come to {number(scene.positions[first])} m{left_out}{others}"
 
 
 def _draw_scale(sheet: Sheet, high: float) -> None:
@@ -239,11 +262,12 @@ def _name_nodes(scene: Layout, sheet: Sheet) -> None:
 
 
 def _draw_support(body: Placed, held: Held, sheet: Sheet) -> None:
-    """A hatched line where rotations are held too, else triangles: one below where it carries, else one on each side
-    that is held."""
+    """A hatched line where it may not bend away either, else triangles: one below where it carries, else one on each
+    side that is held. Held about its own axis alone a member bends freely."""
     place, u = body.at(held.place), sheet.u
     own = [body.turn @ axis for axis, word in zip(AXES, "xyz", strict=True) if word in held.ways]
-    if own and any(word.startswith("r") for word in held.ways):
+    about = [axis for axis, word in zip(AXES, ("rx", "ry", "rz"), strict=True) if word in held.ways]
+    if own and any(abs(axis @ held.outward) < 0.7 for axis in about):
         sheet.ground(place, body.turn @ held.outward)
         return
     carries = any(abs(axis[2]) > 0.7 for axis in own)

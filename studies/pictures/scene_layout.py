@@ -16,6 +16,7 @@ import numpy as np
 from engine.bodies.modal.description import Spot
 from engine.bodies.modal.outline import Outline
 from engine.model.scene_model import BodyPart, SceneModel
+from engine.model.station_path import in_row
 from engine.scene.carriages import Carriage, Contact
 from engine.scene.frames import GROUND
 from engine.scene.motions.base import Motion
@@ -176,7 +177,23 @@ def in_a_row(model: SceneModel) -> dict[str, float]:
     others = found.keys() - model.study.axles.keys()
     if any(off[name] > FAR for name in others):
         row |= {name: found[name] for name in others}
-    return {name: place for name, place in row.items() if name in others or off[name] <= SEEN}
+    return _seen(model, row)
+
+
+def with_first_at(model: SceneModel, place: float) -> dict[str, float]:
+    """Where carriages stand while the first is at a place, m: the other axles of its train behind it as everywhere,
+    all others where they start."""
+    return _seen(model, {tie.name: float(in_row(model, tie.name, np.array([place]))[0]) for tie in model.carriages})
+
+
+def _seen(model: SceneModel, places: Mapping[str, float]) -> dict[str, float]:
+    """The same without axles of trains that are far off their bodies."""
+    lengths = {tie.name: model.bodies[tie.body].modal.length for tie in model.carriages}
+    return {
+        name: place
+        for name, place in places.items()
+        if name not in model.study.axles or max(-place, place - lengths[name]) <= SEEN * lengths[name]
+    }
 
 
 def _instant(model: SceneModel) -> float:

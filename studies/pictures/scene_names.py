@@ -20,10 +20,11 @@ class Label(NamedTuple):
 
 
 class Named(NamedTuple):
-    """A name in the rows above or below a drawing: its middle, and the number of its row."""
+    """A name in the rows above or below a drawing: its middle, half of its width, and the number of its row."""
 
     label: Label
     x: float
+    half: float
     row: int
 
 
@@ -35,14 +36,15 @@ def in_rows(names: Sequence[Label], ends: tuple[float, float]) -> list[Named]:
         x = min(max(float(label.place[0]), ends[0] + half), ends[1] - half)
         row = next((place for place, end in enumerate(taken) if end <= x - half), len(taken))
         taken[row : row + 1] = [x + half]
-        found.append(Named(label, x, row))
+        found.append(Named(label, x, half, row))
     return found
 
 
 def write(names: Sequence[Named], axes: Any, edge: float, step: float) -> None:
-    """Names in their rows beyond an edge, each with a line to its place."""
+    """Names in their rows beyond an edge, each with a line to its place: upright where that lies beside the name, so
+    that lines do not cross."""
     box = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
-    for (place, text, colour, _), x, row in names:
-        height = edge + (row + 0.6) * step
-        axes.plot([place[0], x], [place[1], height], color=colour, linewidth=0.5, alpha=0.6, zorder=1.0)
+    for (place, text, colour, _), x, half, row in names:
+        height, foot = edge + (row + 0.6) * step, min(max(float(place[0]), x - half), x + half)
+        axes.plot([place[0], foot], [place[1], height], color=colour, linewidth=0.5, alpha=0.6, zorder=1.0)
         axes.text(x, height, text, color=colour, ha="center", va="center", fontsize=8.0, bbox=box, zorder=6.0)

@@ -29,13 +29,13 @@ from results_schema.errors import BadInput
 from results_schema.store import files
 from studies.at_rest.positions import way_of
 from studies.pictures.common.figures import svg
-from studies.pictures.moving_shapes import body_pieces, moving, scene_pieces, view_of_all
+from studies.pictures.moving_shapes import body_pieces, moving, scene_pieces, unseen, view_of_all
 from studies.pictures.scene import pictures
-from studies.pictures.scene_layout import Layout, Placed, in_a_row, layout, starts
+from studies.pictures.scene_layout import Layout, Placed, in_a_row, layout, starts, with_first_at
 from studies.protocol.study import kind_of
 from studies.reporting.report import Drawn, Row, check_folder, page_template
 from studies.results.findings_common import has_dampers, told_trains
-from studies.results.formatting import counted, number, percent, quantity, spanned, swept_quantity, typed_speed
+from studies.results.formatting import number, percent, quantity, spanned, swept_quantity, typed_speed
 
 PAGE = "drawing.html"
 SHOWN = 6  # modes
@@ -98,12 +98,19 @@ def page_of(study: Study, remarks: Sequence[str]) -> SimpleNamespace:
         figures=drawn,
         shapes=[*(_of_body(model, body) for body in scene.bodies.values()), *_of_whole(model)],
         tables=[
-            table
+            _without_empty(table)
             for table in (_bodies(scene), _supports(scene), _trains(study), _carriages(scene, study), _sensors(scene))
             if table.rows
         ],
         study_text=study.source.text,
     )
+
+
+def _without_empty(table: Table) -> Table:
+    """The table without columns in which nothing stands."""
+    kept = [place for place in range(len(table.headings)) if any(row[place] for row in table.rows)]
+    rows = [[row[place] for place in kept] for row in table.rows]
+    return table._replace(headings=[table.headings[place] for place in kept], rows=rows)
 
 
 def _of_body(model: SceneModel, body: Placed) -> Shapes:
@@ -112,19 +119,17 @@ def _of_body(model: SceneModel, body: Placed) -> Shapes:
     rates = VariantValues(model.study, {}, 1).damping_rates(name, omega)[:, 0]
     shapes = [list(body_pieces(body, unit)) for unit in np.eye(omega.size)[:SHOWN]]
     view, shown = view_of_all(shapes), []
+    largest = max(float(np.abs(piece.motion).max()) for shape in shapes for piece in shape)
     for mode, shape in enumerate(shapes):
         picture = moving(shape, view, f"mode {mode + 1}")
         damping = (
             f"damping {percent(float(rates[mode] / (2.0 * omega[mode])))}" if omega[mode] > 0.0 else "moves freely"
         )
-        shown.append(Row(f"mode {mode + 1}", f"{number(float(omega[mode]) / (2.0 * np.pi))} Hz, {damping}", picture))
-    kept = (
-        f"The lowest {len(shown)} of {counted(omega.size, 'mode')}, without carriages"
-        if omega.size > len(shown)
-        else "All its modes, without carriages"
-    )
+        said = (f"{number(float(omega[mode]) / (2.0 * np.pi))} Hz", damping, unseen(shape, largest))
+        shown.append(Row(f"mode {mode + 1}", ", ".join(filter(None, said)), picture))
+    kept = f"The lowest {len(shown)} modes" if omega.size > len(shown) else "All its modes"
     beside = " Damping is of the body alone: its dampers come on top." * has_dampers(model.study, name)
-    return Shapes(f"Mode shapes of {name}", f"{kept}; grey: at rest.{beside}", shown)
+    return Shapes(f"Mode shapes of {name}", f"{kept}, without carriages; grey: at rest.{beside}", shown)
 
 
 def _of_whole(model: SceneModel) -> Iterator[Shapes]:
@@ -134,21 +139,24 @@ def _of_whole(model: SceneModel) -> Iterator[Shapes]:
         return
     with suppress(BadInput):  # a vehicle that is longer than its body never stands on it with all its contacts
         low, high = way_of(model.study)
-        first, positions = model.carriages[0].name, starts(model)
+        first = model.carriages[0].name
         passes = model.study.carriage[first].motion.passes
-        place = 0.5 * (low + high) if passes else min(max(positions[first], low), high)
+        place = 0.5 * (low + high) if passes else min(max(starts(model)[first], low), high)
         found = coupled_modes(model, VariantValues(model.study, {}, 1), frozen(model, np.array([place])), SHOWN)
-        scene = layout(model, positions | {first: place})
+        scene = layout(model, with_first_at(model, place))
         known = np.flatnonzero(np.isfinite(found.omega[0, 0]))
         shapes = [scene_pieces(scene, found.shapes[0, 0, :, mode]) for mode in known]
         view, shown = view_of_all(shapes), []
+        largest = max(float(np.abs(piece.motion).max()) for shape in shapes for piece in shape)
         for mode, shape in zip(known, shapes, strict=True):
             hertz = float(found.omega[0, 0, mode]) / (2.0 * np.pi)
             picture = moving(shape, view, f"mode {mode + 1} of the whole")
-            shown.append(Row(f"mode {mode + 1}", f"{number(hertz)} Hz", picture))
+            said = (f"{number(hertz)} Hz", unseen(shape, largest))
+            shown.append(Row(f"mode {mode + 1}", ", ".join(filter(None, said)), picture))
+        behind = ", the other axles of its train in their row" * (first in model.study.axles)
         note = (
-            f"Bodies and carriages together, undamped, with {first} at {number(place, 4)} m of its track; motions "
-            "that nothing resists are left out."
+            f"Bodies and carriages together, undamped, with {first} at {number(place, 4)} m of its track{behind}; "
+            "motions that nothing resists are left out."
         )
         yield Shapes("Mode shapes of the whole with its carriages", note, shown)
 

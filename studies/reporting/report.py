@@ -212,11 +212,12 @@ def _minus(text: str) -> str:
 
 
 def _unbroken(text: str) -> str:
-    """A value that breaks between it and its error alone.
+    """A value that breaks between it and its error alone; lines end behind hyphens, but not at a minus sign.
 
-    >>> _unbroken("1.5 kN m ± 2 N m").replace("\N{NO-BREAK SPACE}", "_")
-    '1.5_kN_m ±_2_N_m'
+    >>> _unbroken("1.5 kN m ± 2e-5 N m").replace("\N{NO-BREAK SPACE}", "_").replace("\N{MINUS SIGN}", "~")
+    '1.5_kN_m ±_2e~5_N_m'
     """
+    text = re.sub(r"(?<=\de)-(?=\d)", "\N{MINUS SIGN}", text)
     return text.replace(" ", "\N{NO-BREAK SPACE}").replace("\N{NO-BREAK SPACE}±", " ±")
 
 
@@ -295,9 +296,11 @@ def _row(results: Results, path: str, value: Any, swept: Mapping[str, str]) -> R
 
 
 def _in_words(results: Results, path: str, value: Any) -> str:
-    """A value of the study file with its unit, which texts have already; tables in a list with those of their own."""
+    """A value of the study file with its unit, which texts have already; what is listed with those of its own."""
     if isinstance(value, list | tuple) and any(isinstance(item, dict) for item in value):
         return "; ".join(_in_words(results, f"{path}.{place}", item) for place, item in enumerate(value))
+    if isinstance(value, list | tuple) and any(isinstance(item, str) for item in value):
+        return ", ".join(_in_words(results, path, item) for item in value)
     if isinstance(value, dict):
         return ", ".join(f"{key} {_in_words(results, f'{path}.{key}', item)}" for key, item in value.items())
     if isinstance(value, str):

@@ -176,7 +176,9 @@ class Results:
         own = self.study.sensor[sensor]
         if own.rides is not None:
             spot = f"at {own.contact} " if own.contact else ""
-            return f"{spot}{'under' if own.under else 'of'} {own.rides}"
+            sprung = own.reads.of_mass and self.study.carriage[own.rides].suspension is not None
+            of = "of the sprung mass of" if sprung else "of"
+            return f"{spot}{'under' if own.under else of} {own.rides}"
         if own.at is None:
             return f"at {own.node or own.point}{own.way_in_words}"
         swept = any(f"sensor.{sensor}.at" in axis.paths for axis in self.axes)

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from studies.results.results import Results
 
 MOST_NAMED = 4
+HOLDING = "While holding, as after the last move,"
+ALIKE = 0.01  # of errors: what differs by less is as good
 
 
 def answer(results: Results) -> list[str]:
@@ -26,12 +28,16 @@ def answer(results: Results) -> list[str]:
     statuses."""
     missed = list(told_missed(results))
     others = {status for status, count in results.status_counts.items() if count and status != Status.OK}
+    held = list(_held(results))
+    works = np.isfinite(results.dataset["error_working"]).any()
     return [
         *told_limits(results),
         *_falls(results),
         *missed,
+        *([] if works else held),
         *_front(results),
         *_errors(results),
+        *(held if works else []),
         *_statics(results),
         *_deflections(results),
         *_causes(results),
@@ -78,6 +84,25 @@ def _falls(results: Results) -> Iterator[str]:
         )
 
 
+def _held(results: Results) -> Iterator[str]:
+    """Which variants are least off their plan while all tools hold, as after their last moves, and which most."""
+    off = results.dataset["error_holding"].max("robot").transpose(*results.dims).values
+    best, most = extreme(off, np.nanargmin), extreme(off)
+    if best is None or most is None:
+        return
+    least, largest = float(off[best]), float(off[most])
+    if results.size == 1 or largest <= (1.0 + ALIKE) * least:
+        of_all = f" in every variant within {percent(ALIKE)}" if results.size > 1 else ""
+        yield f"{HOLDING} tools are off their plan by up to {quantity(largest, 'm')}{of_all}."
+        return
+    alike = int(np.count_nonzero(off <= (1.0 + ALIKE) * least))
+    many = f", and as little within {percent(ALIKE)} in {counted(alike - 1, 'other variant')}" if alike > 1 else ""
+    yield (
+        f"{HOLDING} tools are least off their plan{in_words(results, best)}: by up to "
+        f"{quantity(least, 'm')}{many}. Most they are{in_words(results, most)}: {quantity(largest, 'm')}."
+    )
+
+
 def _errors(results: Results) -> Iterator[str]:
     for name in results.study.robot:
         part = results.dataset.sel(robot=name)
@@ -104,12 +129,13 @@ def _statics(results: Results) -> Iterator[str]:
     if not known.any():
         return
     times = spanned(dataset["at_rest"].values[known], percent)
-    off = {name: np.nan_to_num(dataset[f"beyond_rest_{name}"].values[known] / largest[known]).max() for name in DOING}
-    told = listed([f"{percent(float(off[name]))} {words}" for name, words in DOING.items()])
+    done = {name: words for name, words in DOING.items() if np.isfinite(doing[name]).any()}
+    off = {name: np.nan_to_num(dataset[f"beyond_rest_{name}"].values[known] / largest[known]).max() for name in done}
+    told = listed([f"{percent(float(off[name]))} {words}" for name, words in done.items()])
     limit = percent(results.study.solver.tolerance)
     yield (
-        f"Statics alone would have told where tools are to {limit} of their largest errors for {times} of the time; at "
-        f"other times they are off, in parts of these, by up to {told}."
+        f"Statics alone would do to {limit} of the largest errors for {times} of the time; at other times tools are "
+        f"off where they would rest by up to {told}, in parts of their largest errors."
     )
 
 
@@ -189,5 +215,7 @@ def _front(results: Results) -> Iterator[str]:
         index = tuple(int(i) for i in np.unravel_index(number, results.shape))
         off = quantity(float(error.reshape(-1)[number]), "m")
         told.append(f"{off} in {quantity(float(cycle[number]), 's', 4)} ({results.at(index)})")
-    best = f"{chosen.size} of {results.size} variants {'is' if chosen.size == 1 else 'are'} best"
-    yield f"{best}, as none is both faster and nearer to rest {words}: {'; '.join(told)}."
+    best = f"{chosen.size} of {results.size} variants {'is' if chosen.size == 1 else 'are'} best, as none is both"
+    if chosen.size == results.size:
+        best = f"Each of the {results.size} variants trades time for accuracy: none is both"
+    yield f"{best} faster and nearer to rest {words}: {'; '.join(told)}."

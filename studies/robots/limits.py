@@ -21,7 +21,7 @@ from studies.robots.question import LIMITED, Question
 if TYPE_CHECKING:
     from studies.results.results import Results
 
-DOING = {"moving": "in moves", "working": "at work", "holding": "while they hold"}
+DOING = {"moving": "in moves", "working": "at work", "holding": "while holding"}
 MOST_TOLD = 4  # values of other swept numbers that are told one by one
 
 
@@ -190,7 +190,7 @@ class _Found:
         if not turns.size:
             return f"everywhere from {axis.noun} {axis.span}" if kept[0] else "nowhere", ""
         if turns.size > 1:
-            return f"at {axis.noun} {self._parts(axis, order, kept)} alone", ""
+            return f"only at {axis.noun} {self._parts(axis, order, kept)}", ""
         last, first = (turns[0], turns[0] + 1) if kept[0] else (turns[0] + 1, turns[0])
         side = f"up to {axis.at(order[last])}" if kept[0] else f"from {axis.at(order[last])} on"
         beyond = self.off(places[first]) if self.known[places[first]] else "no value is known"

@@ -313,6 +313,24 @@ def test_an_ordinary_study_is_not_remarked() -> None:
     assert remarks(make_plan(on_portal(inertia_along=True, inertia_across=True))) == []
 
 
+STRAIGHT = {
+    **{"kind": "frame", "plane": "xz", "node": {"a": [0, 0], "b": [1, 0], "c": [2, 0]}},
+    "section": {"box": {"area": 1.0, "second_moment": 0.1, "youngs_modulus": 1.0, "density": 1.0}},
+    "member": {name: {"nodes": [*name], "section": "box"} for name in ("ab", "bc")},
+    **{"supports": {"a": "pinned", "b": ["z"], "c": ["z"]}, "track": {"members": ["ab", "bc"]}},
+}
+
+
+@pytest.mark.parametrize("direction", [None, "x"])
+def test_what_moves_along_a_straight_bridge_alone_is_not_remarked(direction: str | None) -> None:
+    """Unless a sensor reads that way: a mass that acted along it would lower frequencies of these shapes alone."""
+    sensor = {"end": {"body": "straight", "member": "ab", "at": 0.5} | ({"direction": direction} if direction else {})}
+    car = mass(0.1, cruise(0.0, 2.0, 0.1), on="straight")
+    found = Study(schema_version=1, kind="passage", body={"straight": STRAIGHT}, carriage={"car": car}, sensor=sensor)
+    told = [text for text in remarks(make_plan(found)) if "does not act along its track" in text]
+    assert len(told) == (direction is not None)
+
+
 @pytest.mark.parametrize("speed", [145.0, "720 km/h"], ids=["not so fast", "with its unit"])
 def test_speeds_are_not_always_remarked(speed: float | str) -> None:
     fast = passing(beam(youngs_modulus=1e8), car=mass(0.1, WAY | {"speed": speed}))

@@ -82,4 +82,7 @@ def test_other_sensors_that_exceed_statics_are_told_with_the_first() -> None:
     found = studies.run(built(beam(), mass(0.3, cruise(0.0, 1.0, 0.1)), sensor=sensors, sweep=speeds))
     gain = {name: float(found.dynamic_amplification.sel(sensor=name).max()) for name in sensors}
     assert gain["end"] > 1.1
-    assert f"Of the other sensors end (up to {gain['end']:.3g}) exceeds 1.1." in answers.answer(found)[0]
+    assert (
+        f"Of the other sensors end (up to {gain['end']:.3g}) exceeds a dynamic amplification of 1.1."
+        in answers.answer(found)[0]
+    )

@@ -56,6 +56,12 @@ def test_axles_at_equal_distances_push_in_step_where_they_come_once_in_some_peri
     assert [one.part for one in speeds] == pytest.approx([1.0] * 4, abs=1e-3)
 
 
+def test_two_axles_are_no_train() -> None:
+    """Two pushes leave no resonance."""
+    assert found(hauled(beam(), axles=3, spacing=0.3), 0.2, 1.0)
+    assert not found(hauled(beam(), axles=2, spacing=0.3), 0.2, 1.0)
+
+
 def test_of_many_the_strongest_are_told() -> None:
     """Eight at most, the highest speed first, of four frequencies."""
     given, body = with_frequencies(2.0, 5.0, 9.0, 30.0, 50.0)

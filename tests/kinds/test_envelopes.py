@@ -124,7 +124,7 @@ def test_an_envelope_with_a_limit_is_judged_before_sensors_that_say_less() -> No
     found = {figure.name: figure for figure in answers.figures(shaken(3.0))}
     assert next(iter(found)) == "envelopes"
     assert found["envelopes"].title == f"The largest acceleration {where}, beyond the limit of 2 m/s²"
-    assert "Red: limits that the study names." in found["envelopes"].caption
+    assert "Orange: limits that the study names." in found["envelopes"].caption
 
 
 def test_what_sensors_say_as_well_stays_with_the_envelopes() -> None:

@@ -380,6 +380,6 @@ def test_a_limit_is_told_with_where_it_is_exceeded() -> None:
     assert told[1].startswith("root: the ") and "exceeds" not in told[1]
     assert any(text.startswith("The energy of everything (motion, bending") for text in told)
     sizes = next(one for one in pictures(Results.of(found)) if one.name == "largest-displacement")
-    assert "beyond the limit" in sizes.title and "Red: limits" in sizes.caption
+    assert "beyond the limit" in sizes.title and "Orange: limits" in sizes.caption
     with pytest.raises(BadInput, match=r"question\.displacement: must be > 0"):
         kind_of(study).check_tables(study.with_values({"question.displacement": 0.0}))

@@ -104,7 +104,7 @@ def test_red_is_explained_where_a_limit_is_drawn() -> None:
         found = drawn(swayed(f'[question]\ndisplacement = "{limit}"'))
         for name in ("largest-displacement", "response", "envelopes"):
             lines = [line for axes in found[name].drawing.axes for line in limits(axes)]
-            assert bool(lines) == ("Red: limits that the study names." in found[name].caption)
+            assert bool(lines) == ("Orange: limits that the study names." in found[name].caption)
             assert bool(lines) == is_drawn or name == "envelopes"
 
 

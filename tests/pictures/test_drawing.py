@@ -200,6 +200,21 @@ def test_what_follows_stands_behind() -> None:
     assert in_a_row(base_scene(study(beam(), axles | {"d": CAR | {"delay": 9.0}})))["b"] == 0.0
 
 
+@pytest.mark.parametrize(("start", "end", "behind"), [(0.0, 1.0, -0.25), (1.0, 0.0, 0.25)])
+def test_axles_swing_where_their_frequencies_have_them(start: float, end: float, behind: float) -> None:
+    """The second one behind the first, which is half-way; both swing as far as the mode moves them there."""
+    tram = mass(0.3, cruise(start, end, 1.0)) | {"spacing": [0.25]}
+    shapes = page_of(study(beam(), {}, train={"tram": tram}), ()).shapes[-1]
+    assert "with tram_1 at 0.5 m of its track, the other axles of its train in their row" in shapes.note
+    rest = re.search(r'class="rest"[^>]* d="([^"]*)"', shapes.pictures[0].remark)
+    assert rest is not None
+    bed, *blocks = (
+        np.array([float(x) for x in re.findall(r"(-?[\d.]+) -?[\d.]+", line)]) for line in rest[1].split("M")[1:]
+    )
+    middle = [0.5 * float(x.min() + x.max()) for x in blocks]
+    assert (np.array(middle) - bed[0]) / np.ptp(bed) == pytest.approx([0.5, 0.5 + behind], abs=1e-3)
+
+
 SWEPT = {"speed": {"of": "train.tram.motion.speed", "values": ["9 km/h", "18 km/h", "14.4 km/h"]}}
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import pairwise
 
 import numpy as np
@@ -14,6 +15,7 @@ from studies.findings.in_step import speeds_in_step
 from studies.pictures.common.figures import VERMILION, Figure
 from studies.reporting import answers
 from studies.reporting.report import MOST_OPEN
+from studies.results.formatting import listed, number, quantity
 from studies.results.results import Results
 from studies.runs import datasets
 from studies.runs.archived import results_of
@@ -146,6 +148,25 @@ def test_speeds_at_which_axles_push_in_step_are_marked() -> None:
     for axes in figure.drawing.axes[:4]:
         marks = [float(np.asarray(line.get_xdata())[0]) for line in axes.get_lines() if line.get_linestyle() == ":"]
         assert marks == pytest.approx([3.6 * one.speed for one in strongest])
+    dotted = [
+        f"{number(3.6 * one.speed, 4)} km/h (tram, every {quantity(one.way, 'm')} with {number(one.frequency)} Hz)"
+        for one in sorted(strongest)
+    ]
+    assert f"Dotted: axles in step with a frequency of the body without them, {listed(dotted)}." in figure.caption
     (legend,) = figure.drawing.legends
     assert [text.get_text() for text in legend.get_texts()] == ["axles in step with a frequency"]
     assert not [one for one in figures(run("")).values() if one.drawing.legends and one.name != "response"]
+
+
+def test_axles_are_marked_as_far_apart_as_the_figure_has_them() -> None:
+    """At the spacing that it holds, which is that of the answer, not that of the study file; at none of several."""
+    spacing = 'spacing = { of = "train.tram.spacing", values = [2.0, 4.0] }'
+    load = 'load = { of = "train.tram.force", values = [400, 500] }'
+    for other, is_held in ((load, True), ("", False)):
+        archive = datasets.archive_of(scenes.run("passage", f"{SPEED}\n{spacing}\n{other}", extra=TRAIN), "tram.nc")
+        results = results_of(archive)
+        (figure,) = (one for one in answers.figures_of(results) if one.name == "largest-displacement")
+        told = [float(text) for text in re.findall(r"tram, every ([\d.]+) m with", figure.caption)]
+        held = re.findall(r"Held at spacing ([\d.]+) m", figure.caption)
+        assert bool(told) == bool(held) == is_held
+        assert all(round(float(held[0]) / way) == pytest.approx(float(held[0]) / way, rel=0.02) for way in told)

@@ -219,7 +219,7 @@ def telling_limits(figure: Figure) -> Figure:
     lines = [line for axes in figure.drawing.axes for line in axes.get_lines()]
     if not any(line.get_label() == LIMIT for line in lines):
         return figure
-    return replace(figure, caption=f"{figure.caption} Red: limits that the study names.".strip())
+    return replace(figure, caption=f"{figure.caption} Orange: limits that the study names.".strip())
 
 
 def limit_far(axes: Axes, words: str) -> None:

@@ -53,22 +53,21 @@ def response(results: Results, ranked: list[str], limits: Limits, shown: list[In
     height = 0.8 + 1.9 * len(sensors)
     figure = draw("response", title, caption, height, partial(_draw, results, sensors, limits, shown))
     if any(axes.patches for axes in figure.drawing.axes):
-        grey = f"Grey: {results.carriage_name} has left, and would have come so far."
+        grey = f"Grey: {results.carriage_name} has left, and the axis goes on at its last speed."
         figure = replace(figure, caption=f"{figure.caption} {grey}")
     return telling_limits(figure)
 
 
 def _reached(results: Results, sensor: str, index: Index) -> tuple[float, float]:
-    """The value of largest size of one variant and the place of the first carriage then: of all steps, where that is
-    known, else of the history."""
-    way = over_way(results, sensor, index)
-    at = int(np.argmax(np.abs(way.values)))
-    end = f"{sensor}_{'max' if way.values[at] >= 0.0 else 'min'}"
-    if f"{end}_position" in results.dataset:
-        value, place = (float(results.row(results.dataset[name], index)) for name in (end, f"{end}_position"))
-        if np.isfinite(place):
-            return value, place
-    return float(way.values[at]), float(way.position[at])
+    """The value of largest size of one variant, of all steps, and the place of the first carriage then: where it has
+    left its body, that of the history."""
+    ends = {end: float(results.row(results.dataset[f"{sensor}_{end}"], index)) for end in ("max", "min")}
+    side = max(ends, key=lambda end: abs(ends[end]))
+    place = float(results.row(results.dataset[f"{sensor}_{side}_position"], index))
+    if not np.isfinite(place):
+        way = over_way(results, sensor, index)
+        place = float(way.position[np.argmin(np.abs(way.values - ends[side]))])
+    return ends[side], place
 
 
 def _draw(results: Results, sensors: list[str], limits: Limits, shown: list[Index], drawing: Drawing) -> None:

@@ -9,11 +9,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
+from engine.scene.study import Study
 from engine.scene.trains import axle_name
 from studies.findings.amplification import largest, size_errors, sizes
 from studies.findings.effects import HARDLY
-from studies.findings.in_step import speeds_in_step
-from studies.pictures.common.figures import INK, Figure, draw, limit_far, limit_line, telling_limits
+from studies.findings.in_step import InStep, speeds_in_step
+from studies.pictures.common.figures import FLAT, INK, Figure, draw, limit_far, limit_line, telling_limits
 from studies.pictures.common.sweep_view import UNSEEN, Curve, View, along_axis, draw_curves, one_legend, ratio_above
 from studies.results.findings_common import LOOSE, in_words, told_hanging
 from studies.results.formatting import counted, listed, number, percent, quantity, scale_for, spanned
@@ -22,7 +23,10 @@ from studies.results.results import Results
 
 MOST_SENSORS = 4  # of one quantity
 MOST_MARKED = 4  # speeds of a train
+IN_STEP = "axles in step with a frequency"
 DOTTED: Any = {"color": INK, "linewidth": 0.9, "linestyle": ":", "zorder": 1.6}
+NEAR = 0.2  # of the largest value: curves within less are drawn on an axis of their own range
+ROOM = 0.1  # of that range, beyond its ends
 FAR = 2.0  # times the largest value: a limit beyond is told in words, as curves would be flat under it
 
 
@@ -53,15 +57,26 @@ def sizes_of(seen: View, sensors: list[str], limit: float | None, top: Index) ->
         f"{'Left: l' if amplified else 'L'}argest absolute values"
         f"{'; right: over the largest absolute static value of the same model' if amplified else ''}.",
         f"Dashed: {listed(loose)} estimated to within more than {percent(LOOSE)}." if loose else "",
+        _told_near(seen, shown, limit),
         told_hanging(results, shown),
         "While the contact holds the answer counts; lines go on beyond." if not results.held.all() else "",
         f"{counted(fewer, 'more sensor')} with smaller values." if fewer else "",
         *(_told_flat(seen, name) for name in sensors if name not in varied),
         *(_told_gain(seen, name) for name in shown),
+        _told_in_step(seen),
     )
     fill = partial(_draw, seen, shown, limit, 1 + amplified)
     name = f"largest-{results.noun(shown[0])}"
     return telling_limits(draw(name, _title(results, sensors[0], limit, top), caption, 0.9 + 1.9 * len(shown), fill))
+
+
+def told_flat(seen: View, sensors: list[str], limit: float | None) -> str:
+    """The sizes of sensors, and their amplification, as sentences, where a figure of them would have no more than level
+    lines; "" where it shows something."""
+    if limit is not None or not all(_is_flat(seen, name) and not _has_gain(seen, name) for name in sensors):
+        return ""
+    told = (text for name in sensors for text in (_told_flat(seen, name), _told_gain(seen, name)))
+    return " ".join(filter(None, told))
 
 
 def _is_flat(seen: View, sensor: str) -> bool:
@@ -70,6 +85,26 @@ def _is_flat(seen: View, sensor: str) -> bool:
     size = seen.results.dataset["status"].copy(data=sizes(seen.results, sensor))
     top = float(np.nanmax(seen.plane(size), initial=0.0))
     return not seen.is_sampled and 0.0 < top * UNSEEN >= seen.most_along(seen.x, size)
+
+
+def _near(seen: View, sensor: str, limit: float | None) -> tuple[float, float] | None:
+    """Ends of the axis of a sensor's sizes, and of its limit where that is drawn, where they differ by little beside
+    what they are; None where it begins at 0."""
+    known = seen.plane(seen.results.dataset["status"].copy(data=sizes(seen.results, sensor)))
+    known = known[np.isfinite(known)]
+    low, high = float(known.min(initial=np.inf)), float(known.max(initial=0.0))
+    high = high if limit is None or limit > FAR * high else max(high, limit)
+    if not 0.0 < (1.0 - NEAR) * high < low:
+        return None
+    room = max(ROOM * (high - low), FLAT * high * (high - low < UNSEEN * high))
+    return low - room, high + room
+
+
+def _told_near(seen: View, sensors: list[str], limit: float | None) -> str:
+    """Of which sensors the axis does not begin at 0, as a sentence; "" where all do."""
+    names = [name.replace("_", " ") for name in sensors if _near(seen, name, limit) is not None]
+    axes = "axis" if len(names) == 1 else "axes"
+    return f"The {axes} of {listed(names)} {'does' if len(names) == 1 else 'do'} not begin at 0." if names else ""
 
 
 def _has_gain(seen: View, sensor: str) -> bool:
@@ -154,26 +189,48 @@ def _draw(seen: View, sensors: list[str], limit: float | None, columns: int, dra
     for axes in grid[0]:
         speed_ratio(axes, seen)
     drawing.align_ylabels()
-    marked = _in_step(seen, sensors)
-    lines = [axes.axvline(x, **DOTTED) for x in marked for axes in grid.flat]
+    lines = [axes.axvline(x, **DOTTED) for x, _, _ in _in_step(seen) for axes in grid.flat]
     if lines:
-        drawing.legend(lines[:1], ["axles in step with a frequency"], loc="outside lower right")
+        drawing.legend(lines[:1], [IN_STEP], loc="outside lower right")
 
 
-def _in_step(seen: View, sensors: list[str]) -> list[float]:
-    """Speeds, as along the horizontal axis, at which axles of trains push in step, the strongest of each train; none
-    where the archive's bodies are not at hand."""
-    results, axis, found = seen.results, seen.x, list[float]()
+def _told_in_step(seen: View) -> str:
+    """What stands at the dotted lines, as a sentence; "" where there are none."""
+    assert seen.x is not None
+    told = [
+        f"{seen.x.in_words(x / seen.x.factor)} ({name}, every {quantity(one.way, 'm')} with {number(one.frequency)} Hz)"
+        for x, name, one in sorted(_in_step(seen))
+    ]
+    return f"Dotted: {IN_STEP} of the body without them, {listed(told)}." if told else ""
+
+
+def _in_step(seen: View) -> list[tuple[float, str, InStep]]:
+    """Speeds, as along the horizontal axis, at which axles of trains push in step, with their train, the strongest of
+    each, whatever the figure reads; none without the archive's bodies, or where curves are of several trains."""
+    results, axis, found = seen.results, seen.x, list[tuple[float, str, InStep]]()
     assert axis is not None
     for name, train in results.study.train.items():
         factor = axis.targets.get(f"carriage.{axle_name(name, 0)}.motion.speed")
-        if factor is not None and train.on in results.models:
+        study = _with_held(seen, name)
+        if factor is not None and study is not None and train.on in results.models:
             between = factor * float(axis.values.min()), factor * float(axis.values.max())
-            readers = [results.study.sensor[sensor] for sensor in sensors]
-            told = speeds_in_step(results.study, name, results.models[train.on], between, readers)
+            told = speeds_in_step(study, name, results.models[train.on], between, study.sensor.values())
             strongest = sorted(told, key=lambda one: one.swing)[-MOST_MARKED:]
-            found += [one.speed / factor * axis.factor for one in strongest]
+            found += [(one.speed / factor * axis.factor, name, one) for one in strongest]
     return found
+
+
+def _with_held(seen: View, train: str) -> Study | None:
+    """The study with the distances of a train that the view holds; None where it shows several, or cannot have them."""
+    results, held = seen.results, dict[str, float]()
+    for axis in results.axes:
+        own = [path for path in results.study.sweep.axes[axis.name].of if path.startswith(f"train.{train}.spacing")]
+        if own and axis.dim not in seen.held:
+            return None
+        held |= {path: float(axis.values[seen.held[axis.dim]]) for path in own}
+    if held and any(results.recorded(body) is not None for body in results.study.body):
+        return None  # it is built anew, for which files would be needed
+    return results.study.without_sweep().with_values(held) if held else results.study
 
 
 def _draw_sizes(axes: Axes, seen: View, sensor: str, limit: float | None) -> None:
@@ -189,6 +246,7 @@ def _draw_sizes(axes: Axes, seen: View, sensor: str, limit: float | None) -> Non
         limit_line(axes, limit * scale.factor, f"limit {quantity(limit, results.sensors[sensor])}", "left")
     elif limit is not None:
         limit_far(axes, f"limit {quantity(limit, results.sensors[sensor])}, beyond this panel")
-    axes.set_ylim(0.0, None)
+    near = _near(seen, sensor, limit)
+    axes.set_ylim(*((0.0, None) if near is None else np.multiply(near, scale.factor)))
     if results.hangs(sensor):
         axes.invert_yaxis()
