@@ -96,7 +96,7 @@ def _audited(variants: int, wanted: int | str) -> str:
 def _of_pieces(parts: Pieces, threads: int) -> Preview:
     """That of pieces, one after another, and the time they take."""
     kind, study, pieces = parts.kind, parts.study, parts.pieces
-    rows = [("kind", study.kind), ("asks", kind.question), ("pieces", str(len(pieces)))]
+    rows = [("kind", study.kind), ("asks", kind.question), *[("pieces", str(len(pieces)))] * (len(pieces) > 1)]
     cases, around = expand(study), AROUND * time.process_time()
     seen = kind.foreseen(study, threads, parts.audited)
     each = {} if seen else sampled(pieces, threads)
