@@ -95,7 +95,7 @@ def test_statics_are_those_of_finite_elements(name: str, cross: float) -> None:
 
 def test_the_documented_gantry_carries_its_weights() -> None:
     """Slowly, its wheels carry girder and trolley by the lever; the softer beam deflects further."""
-    (text,) = (block for _, block in examples("toml") if "[body.girder]" in block)
+    (text,) = (block for _, block in examples("toml") if "[carriage.gantry]" in block)
     study = load(text)
     model, values = make_plan(study).base, VariantValues(study, {}, 1)
     force = static_values(model, build_sensors(model), values, frozen(model, np.array([4.0]))).contacts[0, 0]
