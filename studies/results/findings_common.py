@@ -144,7 +144,11 @@ def remedy(results: Results) -> str:
     more = [f"{len(sensors) - MOST_MISSED} more"] if len(sensors) > MOST_MISSED else []
     names = listed([*sensors[:MOST_MISSED], *more])
     where = f"the sensor{'s' if len(sensors) > 1 else ''} {names}" if sensors else "sensors"
-    return f' What helps: `tolerance = "told"` on {where}, so that errors are told and not held, or a larger tolerance.'
+    helps = f' What helps: `tolerance = "told"` on {where}, so that errors are told and not held, or a larger tolerance'
+    moving = results.study.carriage.items()
+    jumps = [(name, one.motion.smoothed_by) for name, one in moving if "along" in one.pushes and one.motion.smoothed_by]
+    smooth = listed([f"carriage.{name}.motion.{key}" for name, key in jumps])
+    return f"{helps}; or {smooth}, as forces of inertia that jump strike every mode." if jumps else f"{helps}."
 
 
 def told_statuses(results: Results) -> list[str]:

@@ -7,10 +7,12 @@ import pytest
 import xarray as xr
 
 import studies
+from results_schema.status import Status
 from studies.findings.absolute_errors import absolute_errors
 from studies.reporting import answers
 from studies.reporting.comparison import compare
 from studies.reporting.summary import Range, in_tables
+from studies.results.findings_common import remedy
 from studies.results.results import Results
 from tests.engine.build import mass
 from tests.observation.test_off_track import study
@@ -64,6 +66,21 @@ def test_errors_of_a_body_that_is_pushed_are_over_the_largest_value() -> None:
     assert np.all(results.numbers("dynamic_amplification", "sway") > 2.0)
     told = absolute_errors(with_error(results, "sway_max", 0.25), "sway_max")
     np.testing.assert_allclose(told, 0.25 * own / 0.75, rtol=1e-6)
+
+
+def test_who_misses_a_tolerance_by_braking_at_once_is_told_of_the_jerk() -> None:
+    """Not where one is set."""
+    motion = {"kind": "point-to-point", "start": 0.4, "end": 2.8, "speed": 1.5, "acceleration": 6.0, "dwell": 0.1}
+    sensors, said = {"sway": {"node": "b", "direction": [1.0, 0.0, 0.0]}}, []
+    for more in ({}, {"jerk": 300.0}):
+        car = mass(400.0, motion | more, on="portal", inertia_along=True)
+        dataset = studies.run(study(sensors, carriage={"car": car}, solver={"steps": 400}))
+        dataset["status"].values[...] = Status.TOLERANCE_MISSED
+        said.append(remedy(Results.of(dataset)))
+    assert said[0].endswith(
+        "larger tolerance; or carriage.car.motion.jerk, as forces of inertia that jump strike every mode."
+    )
+    assert said[1].endswith("or a larger tolerance.")
 
 
 def test_errors_over_a_value_of_its_own_know_that_it_is_off_itself() -> None:

@@ -70,6 +70,11 @@ class Motion(SpecOfKind):
         """Seconds per unit of tau."""
 
     @property
+    def smoothed_by(self) -> str:
+        """The key of a limit that is not set and with which its acceleration would not jump; "" where there is none."""
+        return ""
+
+    @property
     def duration(self) -> float:
         """Length of the motion in tau."""
         return 1.0

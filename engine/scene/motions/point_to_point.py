@@ -115,6 +115,10 @@ class PointToPoint(Motion):
     dwell: Time = Field(default=0.0, ge=0)
 
     @property
+    def smoothed_by(self) -> str:
+        return "" if self.jerk else "jerk"
+
+    @property
     def time_scale(self) -> float:
         return self._move.duration + self.dwell
 
