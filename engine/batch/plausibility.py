@@ -13,7 +13,7 @@ from engine.model.lane_table import moving_mass, weight
 from engine.scene.study import Study
 from engine.scene.sweep import broken
 from engine.scene.variants import SpringKeys
-from engine.statics.directions import told_of
+from engine.statics.directions import left_out, told_of
 from engine.study_file.refusals import value_at
 from results_schema.arrays import Array
 from results_schema.quantities import QUANTITIES
@@ -28,6 +28,7 @@ DEEP = 0.1  # of the length: a static deflection beyond linear bending
 # on footbridges and small tools are as light in truth: what is written with its unit is believed.
 LIGHT = 0.005
 SAME_PLACE = 1e-9  # of a length: nearer places are one
+MOMENTS = 33  # of a motion between two of its breaks, at which its acceleration is looked at
 SLOW = 0.1  # Hz, of a mass on its spring: vehicles swing at 0.5 to 20 Hz, and at a thirtieth of that on N/m for kN/m
 
 
@@ -113,6 +114,45 @@ def _partly_inert(plan: Plan) -> Iterator[str]:
     """Of the scene without sweep."""
     if sentence := told_of(plan.base, of_loads=True):
         yield sentence
+
+
+def _braking(plan: Plan) -> Iterator[str]:
+    """Of the carriage that the largest force speeds up or brakes, among those that do not push their bodies along;
+    not where the sentence before asks for the same."""
+    study, could = plan.study, left_out(plan.study)
+    if not study.output.residual or study.solver.fidelity in ("force", "static"):
+        return
+    if any("along" in ways for ways in could.values()) and told_of(plan.base, of_loads=True):
+        return
+    riding = {carriage.riding_body for carriage in study.carriage.values()}  # held along by their own motions
+    forces = {
+        number: max(_along(grid, number) for grid in plan.grids)
+        for number, tie in enumerate(plan.base.carriages)
+        if (own := study.carriage[tie.name]).inertial and "along" not in own.pushes and own.on not in riding
+    }
+    number = max(forces, key=lambda found: forces[found], default=-1)
+    if number >= 0 and forces[number] > 0.0:
+        tie = plan.base.carriages[number]
+        remedy = "frames take it with inertia_along = true"
+        if "along" in could.get(tie.name, ()):
+            remedy = f"{study.source.written(f'carriage.{tie.name}')}.inertia_along = true brings it"
+        elif study.carriage[tie.name].riding_body is not None:
+            remedy = "bodies on contacts never push along"
+        yield (
+            f"the force that brakes {tie.name}, up to {_newtons(forces[number])}, does not push "
+            f"{plan.base.bodies[tie.body].name} along its track, so residual vibration along it is not in the answer; "
+            f"{remedy}"
+        )
+
+
+def _along(grid: SceneGrid, number: int) -> float:
+    """The largest force (N) that speeds up or brakes a carriage; instant reversals are left out."""
+    motion = grid.scene.carriages[number].rider.motion
+    bounds = np.array([0.0, *motion.breaks(), motion.duration])
+    tau = (bounds[:-1, None] + np.diff(bounds)[:, None] * np.linspace(0.0, 1.0, MOMENTS)).ravel()
+    pace = grid.scene.carriages[number].rider.pace / _time_scale(grid)
+    largest = max(float(np.abs(motion.path(tau, side).ddS).max()) for side in ("left", "right"))
+    return largest * float((moving_mass(grid.scene, grid.values, number) * pace**2).max())
 
 
 def _doubtful(plan: Plan) -> Iterator[str]:
@@ -314,6 +354,7 @@ def _time_scale(grid: SceneGrid) -> Array:
 REMARKS: tuple[Callable[[Plan], Iterator[str]], ...]
 REMARKS = (
     _partly_inert,
+    _braking,
     _doubtful,
     _half_united,
     _unsupported,
