@@ -8,6 +8,7 @@ import numpy as np
 
 from engine.accuracy.grids import SceneGrid
 from engine.batch.plan import Plan
+from engine.batch.unreached import unreached
 from engine.bodies.modal.modal_body import ModalBody
 from engine.model.lane_table import moving_mass, weight
 from engine.scene.study import Study
@@ -370,4 +371,5 @@ REMARKS = (
     _deep,
     _thin,
     _brief_rest,
+    unreached,
 )

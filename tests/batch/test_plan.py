@@ -305,6 +305,9 @@ CASES = {
     "force that brakes car, up to 0.2 N, does not push bed along its track, so residual vibration": passing(
         car=mass(0.1, STOP), output={"residual": True}
     ),
+    "acceleration of carriage car is not reached in 2 of 4 variants: it gets to 4 m/s2 there": swept(
+        "carriage.car.motion.acceleration", [2.0, 4.0, 5.0, 6.0], mass(0.1, STOP | {"jerk": 16.0})
+    ),
     "in a first period": passing(beam(modes=1), solver={"steps": 30}),
     "lasts 0.25 first periods of the body, so that residual": passing(
         beam(modes=1), mass(0.1, cruise(0.0, 1.0, 0.5, after=0.25)), output={"residual": True}
@@ -392,6 +395,24 @@ def test_braking_on_frames_is_remarked_once() -> None:
     (alone,) = (text for text in told(STRAIGHT, 1.5) if BRAKING in text)
     assert "carriage.car.inertia_along = true brings it" in alone
     assert not any(BRAKING in text for text in told(STRAIGHT, 1.5, inertia_along=True))
+
+
+@pytest.mark.parametrize(
+    ("key", "values", "jerk", "words"),
+    [
+        ("acceleration", [1.0, 4.0], 16.0, ""),
+        ("acceleration", [1.0, 900.0], None, ""),
+        ("jerk", [1.0, 4.0], 4.0, ""),
+        ("speed", [0.5, 2.0, 3.0], None, "of carriage car is not reached in 2 of 3 variants: it gets to 1.265"),
+    ],
+)
+def test_swept_limits_that_are_not_reached_are_remarked(
+    key: str, values: list[float], jerk: float | None, words: str
+) -> None:
+    """0.8 m from rest to rest: the speed gets to sqrt(a d), the acceleration to sqrt(v j) with a jerk alone."""
+    given = swept(f"carriage.car.motion.{key}", values, mass(0.1, STOP | ({"jerk": jerk} if jerk else {})))
+    told = [sentence for sentence in remarks(make_plan(given)) if "is not reached" in sentence]
+    assert len(told) == bool(words) and all(words in sentence for sentence in told)
 
 
 SWEPT_LOAD = {"of": "carriage.car.force"}
