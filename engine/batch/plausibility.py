@@ -114,17 +114,38 @@ def _limits(plan: Plan) -> dict[str, tuple[str, Array, Array]]:
 def _partly_inert(plan: Plan) -> Iterator[str]:
     """Of the scene without sweep."""
     if sentence := told_of(plan.base, of_loads=True):
+        number, force = _braked(plan)
+        name = plan.base.carriages[number].name
+        if number >= 0 and "along" in left_out(plan.study).get(name, ()):
+            sentence += f"; the force that brakes {name}, up to {_newtons(force)}, does not push along it either"
         yield sentence
 
 
 def _braking(plan: Plan) -> Iterator[str]:
-    """Of the carriage that the largest force speeds up or brakes, among those that do not push their bodies along;
-    not where the sentence before asks for the same."""
-    study, could = plan.study, left_out(plan.study)
+    """Not where the sentence before asks for the same."""
+    study, could, (number, force) = plan.study, left_out(plan.study), _braked(plan)
+    asked = any("along" in ways for ways in could.values()) and number >= 0
+    if number < 0 or (asked and told_of(plan.base, of_loads=True)):
+        return
+    tie = plan.base.carriages[number]
+    remedy = "frames take it with inertia_along = true"
+    if "along" in could.get(tie.name, ()):
+        remedy = f"{study.source.written(f'carriage.{tie.name}')}.inertia_along = true brings it"
+    elif study.carriage[tie.name].riding_body is not None:
+        remedy = "bodies on contacts never push along"
+    yield (
+        f"the force that brakes {tie.name}, up to {_newtons(force)}, does not push "
+        f"{plan.base.bodies[tie.body].name} along its track, so residual vibration along it is not in the answer; "
+        f"{remedy}"
+    )
+
+
+def _braked(plan: Plan) -> tuple[int, float]:
+    """Where residual vibration is asked for, the carriage that the largest force (N) speeds up or brakes, among those
+    that do not push their bodies along, and that force; -1 where there is none."""
+    study = plan.study
     if not study.output.residual or study.solver.fidelity in ("force", "static"):
-        return
-    if any("along" in ways for ways in could.values()) and told_of(plan.base, of_loads=True):
-        return
+        return -1, 0.0
     riding = {carriage.riding_body for carriage in study.carriage.values()}  # held along by their own motions
     forces = {
         number: max(_along(grid, number) for grid in plan.grids)
@@ -132,18 +153,7 @@ def _braking(plan: Plan) -> Iterator[str]:
         if (own := study.carriage[tie.name]).inertial and "along" not in own.pushes and own.on not in riding
     }
     number = max(forces, key=lambda found: forces[found], default=-1)
-    if number >= 0 and forces[number] > 0.0:
-        tie = plan.base.carriages[number]
-        remedy = "frames take it with inertia_along = true"
-        if "along" in could.get(tie.name, ()):
-            remedy = f"{study.source.written(f'carriage.{tie.name}')}.inertia_along = true brings it"
-        elif study.carriage[tie.name].riding_body is not None:
-            remedy = "bodies on contacts never push along"
-        yield (
-            f"the force that brakes {tie.name}, up to {_newtons(forces[number])}, does not push "
-            f"{plan.base.bodies[tie.body].name} along its track, so residual vibration along it is not in the answer; "
-            f"{remedy}"
-        )
+    return (number, forces[number]) if number >= 0 and forces[number] > 0.0 else (-1, 0.0)
 
 
 def _along(grid: SceneGrid, number: int) -> float:
