@@ -301,7 +301,8 @@ def check_readings(scene: SceneModel, window: Window) -> None:
         expected = (
             'kind = "passage" or "trajectory", and a motion with a dwell (point-to-point), or after (cruise), last'
         )
-        raise scene.study.source.fault("output.residual", what, expected=expected, received="true")
+        remedy = "" if window != "whole" else _rest(scene)
+        raise scene.study.source.fault("output.residual", what, expected=expected, received="true", remedy=remedy)
     for sensor in tables.sensors:
         if scene.fidelity is Fidelity.STATIC and sensor.offset_order:
             what = f'fidelity = "static" has no {sensor.quantity}'
@@ -311,6 +312,16 @@ def check_readings(scene: SceneModel, window: Window) -> None:
         if not seen:
             what = "the carriage is off its body for all of the recorded part, so the sensor reads nothing"
             raise scene.study.source.fault(f"sensor.{sensor.name}.under", what, expected="a carriage on its body")
+
+
+def _rest(scene: SceneModel) -> str:
+    """What gives the carriage a rest that comes to its end last, in words."""
+    tie = max(scene.carriages, key=lambda found: found.rider.end)
+    motion = f"{scene.study.source.written(f'carriage.{tie.name}')}.motion"
+    key = next((key for key in ("dwell", "after") if key in type(tie.rider.motion).model_fields), "")
+    if not key:
+        return f"a point-to-point with a dwell as {motion}"
+    return f"{motion}.{key} > 0, a rest after {tie.name}'s stop"
 
 
 def numbers_per_variant(asked: Asked) -> int:

@@ -8,12 +8,13 @@ import numpy as np
 
 from engine.accuracy.grids import SceneGrid
 from engine.batch.plan import Plan
+from engine.batch.unreached import unreached
 from engine.bodies.modal.modal_body import ModalBody
 from engine.model.lane_table import moving_mass, weight
 from engine.scene.study import Study
 from engine.scene.sweep import broken
 from engine.scene.variants import SpringKeys
-from engine.statics.directions import told_of
+from engine.statics.directions import left_out, told_of
 from engine.study_file.refusals import value_at
 from results_schema.arrays import Array
 from results_schema.quantities import QUANTITIES
@@ -28,6 +29,7 @@ DEEP = 0.1  # of the length: a static deflection beyond linear bending
 # on footbridges and small tools are as light in truth: what is written with its unit is believed.
 LIGHT = 0.005
 SAME_PLACE = 1e-9  # of a length: nearer places are one
+MOMENTS = 33  # of a motion between two of its breaks, at which its acceleration is looked at
 SLOW = 0.1  # Hz, of a mass on its spring: vehicles swing at 0.5 to 20 Hz, and at a thirtieth of that on N/m for kN/m
 
 
@@ -112,7 +114,56 @@ def _limits(plan: Plan) -> dict[str, tuple[str, Array, Array]]:
 def _partly_inert(plan: Plan) -> Iterator[str]:
     """Of the scene without sweep."""
     if sentence := told_of(plan.base, of_loads=True):
+        number, force = _braked(plan)
+        name = plan.base.carriages[number].name
+        if number >= 0 and "along" in left_out(plan.study).get(name, ()):
+            sentence += f"; the force that brakes {name}, up to {_newtons(force)}, does not push along it either"
         yield sentence
+
+
+def _braking(plan: Plan) -> Iterator[str]:
+    """Not where the sentence before asks for the same."""
+    study, could, (number, force) = plan.study, left_out(plan.study), _braked(plan)
+    asked = any("along" in ways for ways in could.values()) and number >= 0
+    if number < 0 or (asked and told_of(plan.base, of_loads=True)):
+        return
+    tie = plan.base.carriages[number]
+    remedy = "frames take it with inertia_along = true"
+    if "along" in could.get(tie.name, ()):
+        remedy = f"{study.source.written(f'carriage.{tie.name}')}.inertia_along = true brings it"
+    elif study.carriage[tie.name].riding_body is not None:
+        remedy = "bodies on contacts never push along"
+    yield (
+        f"the force that brakes {tie.name}, up to {_newtons(force)}, does not push "
+        f"{plan.base.bodies[tie.body].name} along its track, so residual vibration along it is not in the answer; "
+        f"{remedy}"
+    )
+
+
+def _braked(plan: Plan) -> tuple[int, float]:
+    """Where residual vibration is asked for, the carriage that the largest force (N) speeds up or brakes, among those
+    that do not push their bodies along, and that force; -1 where there is none."""
+    study = plan.study
+    if not study.output.residual or study.solver.fidelity in ("force", "static"):
+        return -1, 0.0
+    riding = {carriage.riding_body for carriage in study.carriage.values()}  # held along by their own motions
+    forces = {
+        number: max(_along(grid, number) for grid in plan.grids)
+        for number, tie in enumerate(plan.base.carriages)
+        if (own := study.carriage[tie.name]).inertial and "along" not in own.pushes and own.on not in riding
+    }
+    number = max(forces, key=lambda found: forces[found], default=-1)
+    return (number, forces[number]) if number >= 0 and forces[number] > 0.0 else (-1, 0.0)
+
+
+def _along(grid: SceneGrid, number: int) -> float:
+    """The largest force (N) that speeds up or brakes a carriage; instant reversals are left out."""
+    motion = grid.scene.carriages[number].rider.motion
+    bounds = np.array([0.0, *motion.breaks(), motion.duration])
+    tau = (bounds[:-1, None] + np.diff(bounds)[:, None] * np.linspace(0.0, 1.0, MOMENTS)).ravel()
+    pace = grid.scene.carriages[number].rider.pace / _time_scale(grid)
+    largest = max(float(np.abs(motion.path(tau, side).ddS).max()) for side in ("left", "right"))
+    return largest * float((moving_mass(grid.scene, grid.values, number) * pace**2).max())
 
 
 def _doubtful(plan: Plan) -> Iterator[str]:
@@ -314,6 +365,7 @@ def _time_scale(grid: SceneGrid) -> Array:
 REMARKS: tuple[Callable[[Plan], Iterator[str]], ...]
 REMARKS = (
     _partly_inert,
+    _braking,
     _doubtful,
     _half_united,
     _unsupported,
@@ -329,4 +381,5 @@ REMARKS = (
     _deep,
     _thin,
     _brief_rest,
+    unreached,
 )

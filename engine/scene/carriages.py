@@ -259,6 +259,9 @@ class Contact(Spec):
         return 0.0 if self.at is None else self.at - reference
 
 
+NO_PUSH = "braking does not act on bodies on contacts: what rides pushes neither along nor across the track"
+
+
 class BodyCarriage(Carriage):
     """Another body of the study, which nothing else holds, on shoes or wheels; its weight acts.
 
@@ -266,6 +269,11 @@ class BodyCarriage(Carriage):
     points the way of the track that it rides, or lies across it where contacts have a place `at` and an offset.
     contacts: by name; they may stand on several bodies, along whose tracks places count alike.
     """
+
+    looked_for: ClassVar[Mapping[str, str]] = {
+        **Carriage.looked_for,
+        **dict.fromkeys(("inertia_along", "inertia_across"), NO_PUSH),
+    }
 
     kind: Literal["body"]
     body: str

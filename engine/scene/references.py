@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from engine.scene.carriages import Carriage
 from engine.scene.frames import GROUND
@@ -159,4 +159,14 @@ def _must_exist(study: Study, key: str, name: str, table: Literal["body", "carri
     if name not in names:
         expected = f"one of {', '.join(names)}" if names else f"a table such as [{table}.name]; there is none"
         received, remedy = shortened(name), nearest(name, names)
+        near = next((other for other in names if remedy == f'did you mean "{other}"?'), None)
+        if near is not None and not _mentions(study.data, near):  # nothing speaks for that spelling
+            remedy = f'did you mean "{near}", or should [{table}.{near}] be [{table}.{name}]?'
         raise study.source.fault(key, f"no such {table}", expected=expected, received=received, remedy=remedy)
+
+
+def _mentions(data: Any, name: str) -> bool:
+    """Whether a name is a value anywhere in plain data, as it is where something refers to it."""
+    if isinstance(data, dict | list):
+        return any(_mentions(item, name) for item in (data.values() if isinstance(data, dict) else data))
+    return bool(data == name)

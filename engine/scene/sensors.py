@@ -116,7 +116,9 @@ class Sensor(Spec):
         _check_band(self)
         _check_error(self)
         if self.direction is not None and not self.reads.of_arm and self.node is None and self.member is None:
-            raise fault("only nodes and members are read in a direction", expected='node or member = "its name"')
+            remedy = "a node with direction where the carriage stops" if self.under is not None else ""
+            expected = 'node or member = "its name"'
+            raise fault("only nodes and members are read in a direction", expected=expected, remedy=remedy)
         if self.spot is not None and (self.reads.derivative or self.reads.of_contact):
             known = ", ".join(name for name in quantities_of_a_body() if not QUANTITIES[name].derivative)
             expected, remedy = f"quantity: one of {known}", "at = metres along the track"

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 # Whatever is taken to the fourth power on the way to a deflection stays within the range of floating-point numbers.
 SMALLEST, LARGEST = 1e-50, 1e30
 NOT_MEANT = "no usable number"
+NO_JERK = "leave jerk out for no limit; in a list take a large one such as 1e6"
+NO_LIMIT = "a large number such as 1e6 where there is no limit"
 SIZES = f"0 or of a size from {SMALLEST:g} to {LARGEST:g}"
 
 

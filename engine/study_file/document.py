@@ -15,7 +15,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from engine.study_file.checks import NOT_MEANT, SIZES, is_meant
+from engine.study_file.checks import NO_JERK, NO_LIMIT, NOT_MEANT, SIZES, is_meant
 from engine.study_file.slips import what_to_write
 from results_schema.errors import BadInput, printable, shortened
 
@@ -255,7 +255,10 @@ def _refuse_number(value: str | float, expected: str, keys: Sequence[str], sourc
     line = source.text.count("\n", 0, found[0]) + 1 if len(found) == 1 else None
     huge = isinstance(value, int) and value.bit_length() > 128
     received = printable(value, 60) if isinstance(value, str) else "more than 128 bits" if huge else str(value)
-    raise BadInput(NOT_MEANT, where=source.where(".".join(keys), line), expected=expected, received=received)
+    where, remedy = source.where(".".join(keys), line), ""
+    if received.lstrip("+") == "inf":
+        remedy = NO_JERK if keys[-1] == "jerk" else NO_LIMIT if keys[0] == "sweep" else ""
+    raise BadInput(NOT_MEANT, where=where, expected=expected, received=received, remedy=remedy)
 
 
 def _tables(header: str, table: Mapping[str, Any]) -> Iterable[tuple[str, Mapping[str, Any]]]:

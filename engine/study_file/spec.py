@@ -183,7 +183,8 @@ _SYNONYMS: dict[str, tuple[str, ...]] = {
         ("damping_ratio", "damping zeta xi"),
         ("damping", "c"),
         ("stiffness", "k"),
-        ("speed", "v V velocity"),
+        ("speed", "v V velocity max_speed vmax"),
+        ("acceleration", "accel acc a deceleration decel amax"),
         ("gravity", "g"),
         ("at", "x position place"),
     )

@@ -16,7 +16,7 @@ from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from engine.study_file.checks import NOT_MEANT, SIZES, is_meant
+from engine.study_file.checks import NO_JERK, NOT_MEANT, SIZES, is_meant
 from results_schema.errors import shortened
 
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*")
@@ -43,8 +43,10 @@ _COMMON = {
     )
     for name, factor in names.items()
 }  # what pint says of them, which takes half a second to import
+JERK = "m s-3"
 _RIGID = ("rigid", "fixed", "infinite", "infinity", "inf")
 _RUN_TOGETHER = {"kmh": "km/h", "kph": "km/h", "mps": "m/s", "nm": "N m", "knm": "kN m"}
+_RUN_TOGETHER |= dict.fromkeys(("mu", "my", "µ", "mum"), "um")
 
 
 @dataclass(frozen=True)
@@ -139,7 +141,9 @@ def _split(text: str, wanted: Unit) -> tuple[str, str]:
     example = f'a number, or a string such as "1.5 {wanted.typed or "%"}"'
     if match is None:
         stiff = f'a number large against what it supports, such as "1e12 {wanted.typed}", or a frame with a held node'
-        remedy = stiff if "stiffness" in wanted.noun and text.strip().casefold() in _RIGID else ""
+        endless = text.strip().casefold() in _RIGID
+        remedy = NO_JERK if wanted.symbol == JERK and endless else ""
+        remedy = stiff if "stiffness" in wanted.noun and endless else remedy
         raise fault(f"this text is not {wanted.article}", expected=example, received=shortened(text), remedy=remedy)
     if not match[2]:
         raise fault("a number in quotes has no unit", expected=example, received=shortened(text))
@@ -262,7 +266,7 @@ Dimensionless = Annotated[float, Unit("plain number", "", (0, 0, 0))]
 Angle = Annotated[float, Unit("angle", "rad", (0, 0, 0), angle=1, turns=True)]
 AngularRate = Annotated[float, Unit("rate of turning", "rad s-1", (0, 0, -1), angle=1, turns=True)]
 AngularAcceleration = Annotated[float, Unit("angular acceleration", "rad s-2", (0, 0, -2), angle=1, turns=True)]
-Jerk = Annotated[float, Unit("jerk", "m s-3", (1, 0, -3))]
+Jerk = Annotated[float, Unit("jerk", JERK, (1, 0, -3))]
 AngularJerk = Annotated[float, Unit("angular jerk", "rad s-3", (0, 0, -3), angle=1, turns=True)]
 #: Every unit above.
 KNOWN = tuple(unit_of(one) for one in list(globals().values()) if get_origin(one) is Annotated)

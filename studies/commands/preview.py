@@ -14,13 +14,15 @@ from engine.batch.dataset import model_groups
 from engine.batch.plan import Plan
 from engine.batch.plausibility import sprung
 from engine.model.distinct_models import base_scene
-from engine.model.lane_table import moving_mass
+from engine.model.lane_table import moving_mass, weight
 from engine.model.scene_model import SceneModel
+from engine.model.station_path import frozen
 from engine.scene.sensors import Envelope, Sensor
 from engine.scene.study import Study
 from engine.scene.sweep import Axis, Cases, cells_of, expand
 from engine.scene.trains import axle_name
 from engine.scene.variants import VariantValues
+from engine.statics.coupled_modes import coupled_frequencies
 from results_schema.arrays import Array
 from studies.commands import planned_numerics as chosen
 from studies.commands.forecast import AROUND, Forecast, forecast
@@ -41,6 +43,7 @@ from studies.results.formatting import (
 )
 
 FREQUENCIES_SHOWN = 6
+STANDS = 33  # places of a carriage's way
 
 
 @dataclass(frozen=True)
@@ -65,7 +68,7 @@ def _of_variants(parts: Variants, threads: int) -> Preview:
     seen = forecast(plan, threads)
     tables = (
         *(_study(plan), _bodies(plan.base), _tracks(plan.base), *_checks(plan.base)),
-        *(_limits(plan.base), _sprung(plan)),
+        *(_limits(plan.base), _sprung(plan), _standing(plan)),
         *(_sweep(plan.study, plan.cases), _ratios(plan)),
         *_in_step(plan),
         TextTable(seen.title, chosen.HEADINGS, seen.rows),
@@ -221,6 +224,24 @@ def _sprung(plan: Plan) -> TextTable:
         for table, (frequencies, ratios) in sprung(plan).items()
     ]
     return TextTable("Sprung masses by themselves", ("carriage", "natural frequency", "damping ratio"), rows)
+
+
+def _standing(plan: Plan) -> TextTable:
+    """What the first carriage does where it stands, in the scene without its sweep; not of trains and of bodies on
+    contacts, which press in several places, nor on bodies that move away."""
+    base = plan.base
+    tie, values, rows = base.carriages[0], VariantValues(base.study, {}, 1), []
+    body = base.bodies[tie.body].modal
+    if not body.rigid_modes and not base.study.train and base.study.carriage[tie.name].riding_body is None:
+        low, high = np.clip(tie.rider.range, 0.0, body.length)
+        places = np.linspace(low, high, STANDS)
+        sag = np.abs(body.influence_at(places, places) * weight(base, values, 0)[0])
+        frequencies = coupled_frequencies(base, values, frozen(base, places), 1) / (2.0 * np.pi)
+        most = f"up to {quantity(float(sag.max()), 'm')}, at {quantity(float(places[sag.argmax()]), 'm')}"
+        rows.append((tie.name, most, f"{spanned(frequencies.ravel())} Hz"))
+    where = ", in the scene without its sweep" * bool(plan.study.sweep.axes)
+    headings = ("carriage", "static deflection under it alone", "lowest frequency with it")
+    return TextTable(f"Where the first carriage stands{where}", headings, rows)
 
 
 def _sweep(study: Study, cases: Cases) -> TextTable:

@@ -25,6 +25,7 @@ from studies.protocol.stopping import AskedElsewhere
 from studies.results.cells import words_of
 from studies.results.formatting import counted, listed, percent, scientific, times
 from studies.results.results import Results
+from studies.runs.not_audited import told_none, told_none_briefly
 
 if TYPE_CHECKING:
     from engine.batch.audit import Audit
@@ -36,16 +37,6 @@ if TYPE_CHECKING:
 GROUP = "/audit"
 Errors = tuple[Array, Array]  # observed and told (R,)
 LARGE = 0.02  # an estimated error that people should know of where nothing holds it: what figures hardly show
-REASONS = (
-    "it would have taken too long (audit = 20, say, audits 20 variants all the same), or nothing finer than what "
-    "variants were computed with is left to compare them with"
-)
-NONE_AUDITED = f"no variant was audited: {REASONS}"
-NONE_COMPARED = f"no variant was audited: those drawn for it have no values, {REASONS}"
-NONE_OF_THOSE_ASKED = (
-    "no variant was audited, though audit = {}: those drawn for it have no values, or nothing finer than what they "
-    "were computed with is left, or the study was run from Python, which audits none"
-)
 
 
 def audit_group(plan: Plan, dataset: xr.Dataset, work: Work) -> dict[str, xr.Dataset]:
@@ -257,18 +248,7 @@ def _held_accuracy(group: xr.Dataset | None, results: Results) -> str:
     said = f"{found} where {_span(tolerances)} was asked"
     if estimates.size and tolerances.min() < tolerances.max() and results.each_within_tolerance(fine):
         said = f"{found}, each within its own tolerance ({_span(tolerances)})"
-    return f"{said}; {_none(results) if group is None else _compared(group, results)}"
-
-
-def _none(results: Results) -> str:
-    """In a few words that no variant was audited, and why; `told_audit` says it at length."""
-    reasons = {
-        0: "as the study asks for none",
-        "auto": "as it would have taken too long, or nothing finer is left (audit = 20 audits 20 all the same)",
-    }
-    asked = results.study.solver.audit
-    though = f"though audit = {asked}: nothing finer is left, or those drawn have no values"
-    return f"no variant was audited, {reasons.get(asked, though)}."
+    return f"{said}; {told_none_briefly(results) if group is None else _compared(group, results)}"
 
 
 def _fewer(verdict: Verdict, results: Results) -> list[str]:
@@ -320,11 +300,9 @@ def _more(results: Results) -> str:
 
 def told_audit(group: xr.Dataset | None, results: Results) -> list[str]:
     """What the group says, in sentences; where there is none, why no variant was audited if the study asks for some."""
-    asked = results.study.solver.audit
     if group is None:
-        reason = NONE_AUDITED if bool(results.kept.all()) else NONE_COMPARED
-        reason = reason if asked == "auto" else NONE_OF_THOSE_ASKED.format(asked)
-        return [reason] if asked != 0 and is_marched(results.dataset) and bool(results.kept.any()) else []
+        asked = results.study.solver.audit != 0 and is_marched(results.dataset) and bool(results.kept.any())
+        return [told_none(results)] if asked else []
     verdict = Verdict.of(group)
     told = [_told(group, verdict, results)] if verdict.count else []
     if verdict.missed:

@@ -39,6 +39,7 @@ from studies.results.results import Results
 from studies.runs.archived import with_first_frequency
 from studies.runs.audit import GROUP, audit_group, audit_group_of_pieces
 from studies.runs.identity import check_unchanged, files_of, run_key
+from studies.runs.not_audited import why_none, why_none_of_pieces
 from studies.runs.provenance import attributes
 from studies.runs.unreduced import unreduced_group
 
@@ -135,6 +136,7 @@ def _of_variants(parts: Variants, root: xr.Dataset, work: Work) -> Mapping[str, 
     plan = parts.plan
     work.stage(AUDITING)
     audit = audit_group(plan, parts.to_audit(root), work)
+    root.attrs.update({} if audit else why_none(plan))
     models = model_groups(plan.base)
     if plan.study.output.keeps_variants:
         models = with_first_frequency(models, Results(root, plan.study))
@@ -148,7 +150,9 @@ def _of_pieces(parts: Pieces, root: xr.Dataset, work: Work) -> Mapping[str, xr.D
 
     if parts.audited:
         work.stage(AUDITING)
-    return model_groups(base_scene(parts.study)) | audit_group_of_pieces(parts, root, work)
+    audit = audit_group_of_pieces(parts, root, work)
+    root.attrs.update({} if audit else why_none_of_pieces(parts))
+    return model_groups(base_scene(parts.study)) | audit
 
 
 def _write(run: _Run, root: xr.Dataset, store: PartStore, groups: Mapping[str, xr.Dataset]) -> float:

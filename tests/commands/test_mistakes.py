@@ -18,6 +18,12 @@ def axis(text: str) -> str:
     return SMALL.replace(SWEEP, text + "\n")
 
 
+def moved(keys: str) -> str:
+    """The study with a point-to-point motion that has these keys."""
+    limits = keys if "accel" in keys else f"acceleration = 40, {keys}"
+    return SMALL.replace('"cruise"', '"point-to-point"').replace("speed = 5.0 }", f"speed = 5.0, {limits} }}")
+
+
 # what was written instead of what -> exit code, words
 MISTAKES = {
     "a swept scheme": (axis('scheme = { of = "solver.scheme", values = ["auto"] }'), 2, ["word cannot be swept"]),
@@ -76,6 +82,34 @@ MISTAKES = {
     "a thousands comma": (SMALL.replace("density = 1000.0", "density = 7,850"), 2, ["7850"]),
     "a unit without quotes": (SMALL.replace("length = 1.0", "length = 2.5 m"), 2, ["line 7", '"2.5 m"']),
     "Gpa": (SMALL.replace("= 1e9", '= "210 Gpa"'), 2, ['did you mean "GPa"']),
+    "newtons per micron": (
+        SMALL.replace('supports = "pinned-pinned"', 'supports = [{ at = 0.1, stiffness = "400 N/mu" }]'),
+        2, ["supports.0.stiffness", 'did you mean "400 N/um"?'],
+    ),
+    "no limit of jerk": (moved("jerk = inf"), 2, ["motion.jerk", "leave jerk out for no limit; in a list"]),
+    "no limit in words": (moved('jerk = "inf"'), 2, ["motion.jerk", "leave jerk out for no limit"]),
+    "no limit in a list": (
+        axis('j = { of = "carriage.trolley.motion.jerk", values = [inf, 200] }'),
+        2, ["sweep.j.values.0", "a large number such as 1e6 where there is no limit"],
+    ),
+    "accel": (moved("accel = 6"), 2, ["accel: unknown", 'mean "acceleration"?']),
+    "residual without a dwell": (
+        moved("acceleration = 40") + "\n[output]\nresidual = true\n",
+        2, ["output.residual", "carriage.trolley.motion.dwell > 0, a rest after trolley's stop"],
+    ),
+    "a body by another name": (
+        SMALL.replace("[body.beam]", "[body.baem]"),
+        2, ["carriage.trolley.on", 'did you mean "baem", or should [body.baem] be [body.beam]?'],
+    ),
+    "one slip of several": (SMALL.replace('on = "beam"', 'on = "baem"'), 2, ['on: no such body', 'mean "beam"?']),
+    "a direction under a carriage": (
+        f'{SMALL}\n[sensor.sway]\nunder = "trolley"\ndirection = "x"\n',
+        2, ["sensor.sway", "a node with direction where the carriage stops"],
+    ),
+    "braking of a body on contacts": (
+        SMALL.replace('kind = "mass"\nmass = 1.0', 'kind = "body"\nbody = "table"\ninertia_along = true'),
+        2, ["trolley.inertia_along: unknown key", "braking does not act on bodies on contacts"],
+    ),
     "kmh": (SMALL.replace("speed = 5.0", 'speed = "60 kmh"'), 2, ['did you mean "km/h"']),
     "True": (SMALL.replace('steps = "auto"', "static_correction = True"), 2, ["small letters: true"]),
     "a colon": (SMALL.replace("length = 1.0", "length: 1.0"), 2, ["line 7", "equals sign"]),
@@ -104,6 +138,7 @@ OTHER_WORDS = [
     ("Axle_Load = 1.0", "mass = 1.0"),
     ("velocity = 5.0", "speed = 5.0"),
     ("v = 5.0", "speed = 5.0"),
+    ("vmax = 5.0", "speed = 5.0"),
     ("position = 0.5", "at = 0.5"),
 ]
 

@@ -1,14 +1,19 @@
 """The table of `check` that tells what variants are computed with, and what some seconds of measuring forecast."""
 
+import math
 from typing import Any
 
 import pytest
 
 from engine.accuracy.jobs import InTurn
 from engine.batch.plan import Plan, make_plan
+from engine.scene.study import Study
 from studies.commands import forecast as forecasting
 from studies.commands.forecast import Looked, forecast
 from studies.commands.planned_numerics import HEADINGS, chosen, rows
+from studies.commands.preview import preview
+from studies.protocol.study import kind_of
+from studies.results.formatting import quantity
 from tests.engine.build import beam, cruise, mass, study
 
 SPEEDS = {"of": "carriage.car.motion.speed", "from": 1e-3, "to": 1.0, "count": 60, "spacing": "log"}
@@ -27,6 +32,28 @@ def plan() -> Plan:
     found = planned(beam(modes="auto"), {"speed": SPEEDS, "mass": MASSES}, tolerance=1e-2)
     found.choose(InTurn(), 32)
     return found
+
+
+def standing(given: Study) -> list[tuple[str, ...]]:
+    """What `check` says of the first carriage where it stands."""
+    tables = preview(kind_of(given).parts(given), 1).tables
+    return [row for table in tables if table.title.startswith("Where the first") for row in table.rows]
+
+
+def test_where_the_first_carriage_stands() -> None:
+    """W L^3/(48 E I) under it in the middle; by Rayleigh pi^2/sqrt(1 + 2 m), over the supports pi^2."""
+    way = {"kind": "point-to-point", "start": 0.0, "end": 1.0, "speed": 0.1, "acceleration": 1.0}
+    solver = {"steps": 2000, "audit": 0}
+    ((car, sag, frequencies),) = standing(study(beam(modes=12), mass(0.1, way), gravity=4.8, solver=solver))
+    assert car == "car" and sag == f"up to {quantity(0.01, 'm')}, at {quantity(0.5, 'm')}"
+    low, _, high = frequencies.removesuffix(" Hz").partition(" to ")
+    assert float(low) == pytest.approx(0.5 * math.pi / math.sqrt(1.2), rel=1e-2)
+    assert float(high) == pytest.approx(0.5 * math.pi, rel=1e-2)
+
+
+def test_what_moves_away_stands_nowhere() -> None:
+    way = cruise(0.0, 1.0, 0.5)
+    assert standing(study(beam(supports="free-free"), mass(0.1, way), solver={"steps": 2000, "audit": 0})) == []
 
 
 def column(table: list[tuple[str, ...]], name: str) -> list[str]:

@@ -25,9 +25,6 @@ from studies.results.formatting import number, scientific
 from studies.results.results import Results
 from studies.runs.audit import (
     GROUP,
-    NONE_AUDITED,
-    NONE_COMPARED,
-    NONE_OF_THOSE_ASKED,
     Verdict,
     as_json,
     audit_group,
@@ -35,8 +32,9 @@ from studies.runs.audit import (
     told_accuracy,
     told_audit,
 )
+from studies.runs.not_audited import NONE_AUDITED, NONE_COMPARED, NONE_OF_THOSE_ASKED
 from studies.runs.runner import Outcome
-from tests.engine.build import beam
+from tests.engine.build import beam, mass, shuttle, study
 from tests.floating.scenes import sliding_mass
 from tests.robots.scenes import scene
 from tests.studies import at_rest
@@ -243,6 +241,34 @@ def test_the_command_says_it_and_ends_with_3(here: Path, capsys: pytest.CaptureF
 
 def test_it_is_said_that_no_audit_was_worth_its_time() -> None:
     assert told_audit(None, Results.of(studies.run(crossing(RICH, {})))) == [NONE_AUDITED]
+
+
+def told_of_none(found: Outcome) -> str:
+    """What is told at length and in a few words of a run without an audit, at its end as of its archive."""
+    assert found.audit is None
+    told = []
+    for root in (found.results, open_archive(found.archive).root):
+        results = Results.of(root)
+        told.append("; ".join((*told_audit(None, results), told_accuracy(None, results))))
+    assert told[0] == told[1]
+    return told[0]
+
+
+def test_a_run_of_one_variant_says_that_its_audit_would_take_too_long(tmp_path: Path) -> None:
+    """And proposes no more variants than there are."""
+    bed = beam(modes=8, damping_ratio=0.02)
+    told = told_of_none(outcome(study(bed, mass(0.2, shuttle(0.2, 0.8, 0.01, 0.1, 3))), tmp_path))
+    assert "no variant was audited: it would have taken too long (audit = 1 audits it all the same)" in told
+    assert "no variant was audited, as it would have taken too long (audit = 1 audits it all the same)." in told
+    assert "finer" not in told
+
+
+@pytest.mark.parametrize(("asked", "though"), [("auto", "no variant was audited: "), (2, "though audit = 2: ")])
+def test_a_run_that_has_nothing_finer_says_so(asked: int | str, though: str, tmp_path: Path) -> None:
+    """Its variants were computed again all the same."""
+    told = told_of_none(outcome(crossing(beam(modes=64), {"tolerance": 1e-9, "audit": asked}), tmp_path))
+    assert f"{though}nothing finer than what variants were computed with is left to compare them with" in told
+    assert "too long" not in told and "no values" not in told
 
 
 def test_what_marches_nothing_refuses_it() -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from collections.abc import Mapping
 from functools import lru_cache
 from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple
 
@@ -114,6 +115,11 @@ class Motion(SpecOfKind):
     def passing(self, place: float) -> tuple[float, ...]:
         """tau at which it passes a place of its track, ascending; not where it begins, ends or turns back there."""
         return _passing(self, place)
+
+    @property
+    def reached(self) -> Mapping[str, float]:
+        """What it reaches of the limits that it has, by their keys."""
+        return {}
 
     @property
     def legs(self) -> Legs | None:

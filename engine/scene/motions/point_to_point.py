@@ -4,6 +4,7 @@ joints of robots."""
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from functools import cached_property
 from typing import Literal, NamedTuple
 
@@ -129,6 +130,11 @@ class PointToPoint(Motion):
     @property
     def rests_from(self) -> float:
         return float(self._bounds[-1])
+
+    @property
+    def reached(self) -> Mapping[str, float]:
+        top = abs(self.end - self.start) * self._move.top_speed
+        return {"speed": top, "acceleration": top / (self._move.up_time - self._move.jerk_time)}
 
     def range(self) -> tuple[float, float]:
         return min(self.start, self.end), max(self.start, self.end)

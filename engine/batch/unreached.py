@@ -1,0 +1,37 @@
+"""Swept limits of motions that some variants do not reach, which are the same run then."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from engine.batch.plan import Plan
+
+BELOW = 1e-9  # relative: a limit that is missed by more is not reached
+
+
+def unreached(plan: Plan) -> Iterator[str]:
+    """One sentence for every swept limit of a carriage."""
+    swept = {key for axis in plan.study.sweep.axes.values() for key in axis.of}
+    for tie in plan.base.carriages:
+        table = plan.study.source.written(f"carriage.{tie.name}")
+        for key in tie.rider.motion.reached:
+            if f"{table}.motion.{key}" in swept:
+                yield from _of_limit(plan, tie.name, table, key)
+
+
+def _of_limit(plan: Plan, name: str, table: str, key: str) -> Iterator[str]:
+    number, found = 0, list[float]()
+    for grid in plan.grids:
+        study = grid.scene.study
+        reached = study.carriage[name].motion.reached[key]
+        if reached < (1.0 - BELOW) * study.value(f"carriage.{name}.motion.{key}"):
+            number += grid.values.size
+            found.append(reached)
+    if found:
+        unit = plan.study.unit(f"carriage.{name}.motion.{key}")
+        low, high = f"{min(found):.4g}", f"{max(found):.4g}"
+        most = f"{low if low == high else f'{low} to {high}'} {unit.typed if unit else ''}"
+        yield (
+            f"the {key} of {table.replace('.', ' ')} is not reached in {number:,} of {plan.size:,} variants: it gets "
+            f"to {most} there, so that those which differ in it alone are the same run"
+        )
