@@ -166,10 +166,13 @@ def _ranges(found: Sequence[Range], percentiles: Sequence[float]) -> None:
         table("", ("result", "smallest", *parts, "largest", ""), rows[:MOST_ROWS], tallest=TALLEST)
     if rows[MOST_ROWS:]:
         paragraphs(f"{len(rows) - MOST_ROWS} more results: run -v, or the report.")
-    same = [f"{_name(one)} {one.value(one.largest.value)}" for one in found if one.is_constant]
+    alike = [(one, f"{_name(one)} {one.value(one.largest.value)}") for one in found if one.is_constant]
+    same = [words for one, words in alike if not one.partly]
     if same:
         more = f" and {len(same) - MOST_ALIKE} more" if len(same) > MOST_ALIKE else ""
         paragraphs(f"The same in every variant: {', '.join(same[:MOST_ALIKE])}{more}.")
+    if some := [f"{words} {one.partly}" for one, words in alike if one.partly]:
+        paragraphs(f"The same where there is one: {', '.join(some[:MOST_ALIKE])}.")
     loose = [f"{_name(one)} {one.said(one.extreme)}" for one in found if one.is_loose]
     if loose:
         paragraphs(f"By their told errors hardly known: {', '.join(loose)}.")

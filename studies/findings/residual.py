@@ -8,12 +8,16 @@ from results_schema.arrays import Array
 from studies.findings.absolute_errors import absolute_errors, told_error
 from studies.findings.beyond import LIMITED, Limits, in_turns, where_beyond
 from studies.findings.effects import by_effect
+from studies.results.axes import VARIANT
 from studies.results.findings_common import in_words
 from studies.results.formatting import counted, quantity
 from studies.results.places import Index, extreme
 from studies.results.results import Results
 
 MOST_SENSORS = 4
+LAST = 6  # values along a swept number that are looked at
+TURNS = 3  # of the four that these can have: what is swept too coarsely goes up and down from one to the next
+LEAST_STEP = 0.1  # of the largest value: smaller ones do not count as up or down
 
 
 class AskedOfRest(Spec):
@@ -74,11 +78,30 @@ def _residual(results: Results, sensor: str, limits: Limits) -> str:
         f"{told_error(error, size, units)}{in_words(results, place)}"
     )
     limit, settled = limits.limit(results.study.sensor[sensor].quantity), _settled(results, sensor)
+    between = _told_between(results, values, place)
     if limit is None:
-        return f"{said}{settled}."
+        return f"{said}{settled}.{between}"
     axis = next(iter(by_effect(results, values)), None)
     over = f" of {axis.noun}" if axis is not None else ""
-    return f"{said}; it exceeds {quantity(limit, units)} {where_beyond(results, values, limit, axis)}{over}{settled}."
+    beyond = f"{quantity(limit, units)} {where_beyond(results, values, limit, axis)}"
+    return f"{said}; it exceeds {beyond}{over}{settled}.{between}"
+
+
+def _told_between(results: Results, values: Array, place: Index) -> str:
+    """That peaks may be higher between swept values where one is large and the next small, as a sentence behind
+    another; place: of the largest, through which each swept number is followed. "" where none does that."""
+    axes = [axis for axis in by_effect(results, values) if axis.dim != VARIANT]
+    for axis in axes:
+        along = results.dims.index(axis.dim)
+        line = values[tuple(slice(None) if n == along else at for n, at in enumerate(place))][np.argsort(axis.values)]
+        steps = np.diff(line[-LAST:])
+        steps = np.sign(steps[np.abs(steps) > LEAST_STEP * np.nanmax(line)])
+        if np.count_nonzero(np.diff(steps)) >= TURNS:
+            return (
+                f" From one {axis.noun} to the next it goes up and down, so peaks between them may be higher: sweep "
+                "them more closely."
+            )
+    return ""
 
 
 def _settled(results: Results, sensor: str) -> str:
@@ -89,13 +112,15 @@ def _settled(results: Results, sensor: str) -> str:
     values = settling_of(results, sensor)
     left = int(np.count_nonzero(results.with_values & np.isnan(values)))
     place, units, said = extreme(values), results.sensors[sensor], list[str]()
+    known = int(np.count_nonzero(np.isfinite(values)))
     within = f"within {quantity(band, units)} of its static value"
+    among = f"in {known:,} of {counted(known + left, 'variant')} " if left else ""
     if place is not None and float(values[place]) == 0.0:
-        said.append(f"it is {within} from the stop on")
+        said.append(f"{among}it is {within} from the stop on")
     elif place is not None:
         took, error = float(values[place]), float(absolute_errors(results, f"{sensor}_settling_time")[place])
         when = f"{quantity(took, 's')}{told_error(error, took, 's')} after the stop at the latest"
-        said.append(f"it has settled {within} {when}{in_words(results, place)}")
+        said.append(f"{among}it has settled {within} {when}{in_words(results, place)}")
     if left:
         said.append(f"{counted(left, 'variant')} {'have' if left > 1 else 'has'} not settled by the end of the run")
     return "".join(f"; {one}" for one in said)

@@ -18,7 +18,7 @@ from studies.findings.numerics_used import ERROR, WORK, is_marched
 from studies.protocol.study import kind_named
 from studies.results.axes import VARIANT
 from studies.results.cells import End, cell_ranges, counts_of, single_numbers, words_of
-from studies.results.formatting import ALIKE, NOISE, quantity
+from studies.results.formatting import ALIKE, NOISE, counted, quantity
 from studies.results.results import Results
 from studies.runs.audit import Verdict
 from studies.runs.audit import as_json as audit_as_json
@@ -55,6 +55,7 @@ class Range:
     """Smallest and largest of a result over all variants that have one. sensor: "" where it is of no sensor.
 
     percentiles: its value at each of `output.percentiles`. beside: the largest magnitude of that of which it is an end.
+    having: how many variants have it, and how many have results: a settling time is not there where none has settled.
     """
 
     name: str
@@ -64,6 +65,7 @@ class Range:
     largest: Extreme
     percentiles: tuple[float, ...] = ()
     beside: float = 0.0
+    having: tuple[int, int] = (0, 0)
 
     @property
     def extreme(self) -> Extreme:
@@ -81,6 +83,12 @@ class Range:
     def is_constant(self) -> bool:
         """Whether its values differ by rounding alone."""
         return self.largest.value - self.smallest.value <= max(ALIKE * abs(self.extreme.value), NOISE * self.beside)
+
+    @property
+    def partly(self) -> str:
+        """In how many variants it is where some of them lack it; "" else."""
+        own, of = self.having
+        return f"in {own:,} of {counted(of, 'variant')}" if own < of else ""
 
     @property
     def is_loose(self) -> bool:
@@ -234,11 +242,13 @@ def _range(study_results: Results, name: str, sensor: str, array: xr.DataArray) 
     if "position" in array.dims:
         errors = errors_along(study_results, name)
     smallest, largest = (_extreme(study_results, array, pick(values), errors) for pick in (np.nanargmin, np.nanargmax))
+    kept = np.asarray(study_results.kept.values)
+    having = (int(np.isfinite(values[kept]).sum()), int(kept.sum())) if array.dims == study_results.dims else (0, 0)
     percentiles = np.nanpercentile(values, study_results.study.output.percentiles)
     stem = name.removesuffix("_max").removesuffix("_min")
     both = [results[f"{stem}_{end}"].values for end in ("max", "min") if f"{stem}_{end}" in results]
     beside = max((float(np.nanmax(np.abs(one))) for one in both), default=0.0)
-    yield Range(name, sensor, units, smallest, largest, tuple(map(float, percentiles)), beside)
+    yield Range(name, sensor, units, smallest, largest, tuple(map(float, percentiles)), beside, having)
 
 
 def _extreme(results: Results, array: xr.DataArray, flat: np.intp, errors: Array | None) -> Extreme:

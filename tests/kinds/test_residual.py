@@ -11,9 +11,10 @@ import engine
 import studies
 from engine.scene.study import Study, load
 from results_schema.errors import BadInput
+from studies.commands import screens
 from studies.findings.absolute_errors import absolute_errors
 from studies.protocol.study import kind_of
-from studies.reporting import answers
+from studies.reporting import answers, summary
 from studies.results.results import Results
 from tests.engine.build import beam, force, study
 
@@ -167,3 +168,46 @@ def test_it_is_said_how_long_it_takes_to_settle() -> None:
     (axes,) = figure.drawing.axes
     np.testing.assert_allclose(axes.lines[0].get_ydata(), times, rtol=1e-6)
     assert axes.get_ylabel() == "settling time (s)"
+
+
+def test_what_has_not_settled_everywhere_is_not_the_same_everywhere(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A settling time that one of two variants lacks: both sentences and tables tell of how many it is."""
+    sensors = {"midspan": {"body": "bed", "at": 0.5, "settling_band": 17.5e-3}}
+    swept = {"acceleration": SWEPT["acceleration"] | {"values": [2, 6]}}
+    found = studies.run(stops(sensor=sensors, sweep=swept))
+    np.testing.assert_array_equal(found.midspan_settling_time, [0.0, np.nan])
+    (said,) = (text for text in answers.answer(found) if "at rest" in text)
+    assert said.endswith(
+        "; in 1 of 2 variants it is within 17.5 mm of its static value from the stop on; 1 variant has not settled by "
+        "the end of the run."
+    )
+    (time,) = (one for one in summary.in_tables(Results.of(found)) if one.name == "midspan_settling_time")
+    assert time.is_constant and time.partly == "in 1 of 2 variants"
+    screens._ranges([time], [])
+    assert " ".join(capsys.readouterr().out.split()).endswith(
+        "The same where there is one: midspan_settling_time 0 s in 1 of 2 variants."
+    )
+    page = studies.report(found, tmp_path / "page").read_text(encoding="utf-8")
+    assert page.count('<span class="at">in 1 of 2 variants</span>') == 2
+
+
+def told_of(sizes: list[float]) -> str:
+    """What is said of residual vibrations (m) over ever faster accelerations."""
+    steps = {"acceleration": {"of": "carriage.car.motion.acceleration", "values": list(range(2, 2 + len(sizes)))}}
+    found = studies.run(stops(sweep=steps))
+    found["midspan_residual"][:] = sizes
+    (said,) = (text for text in answers.answer(found) if "at rest" in text)
+    return said
+
+
+def test_values_that_go_up_and_down_from_one_to_the_next_are_swept_too_coarsely() -> None:
+    """Towards the end, where they are far apart for how it swings; not for two turns, nor for small ones."""
+    hint = (
+        ". From one acceleration to the next it goes up and down, so peaks between them may be higher: sweep them more "
+        "closely."
+    )
+    assert told_of([1e-6, 2e-6, 6.3e-6, 4.6e-6, 7.4e-6, 4.1e-6, 8.2e-6, 6.7e-6]).endswith(hint)
+    for calm in ([1e-6, 2e-6, 4e-6, 3e-6, 2e-6, 1e-6, 5e-6], [1e-6, 4e-6, 3.8e-6, 4.0e-6, 3.8e-6, 4.1e-6, 3.9e-6]):
+        assert "goes up and down" not in told_of(calm)
