@@ -12,9 +12,11 @@ import studies
 from engine.scene.study import Study, load
 from results_schema.errors import BadInput
 from studies.commands import screens
+from studies.findings import theory
 from studies.findings.absolute_errors import absolute_errors
 from studies.protocol.study import kind_of
 from studies.reporting import answers, summary
+from studies.results.formatting import quantity
 from studies.results.results import Results
 from tests.engine.build import beam, force, study
 
@@ -99,6 +101,22 @@ def test_it_is_drawn_over_the_time_after_the_stop() -> None:
     assert seconds[0] == 0.0 and seconds[-1] == pytest.approx(0.6)
     assert seconds.size == pytest.approx(201, abs=5) and np.ptp(np.diff(seconds)) < np.diff(seconds).max()
     assert np.ptp(values) == pytest.approx(2e3 * float(found.midspan_residual), rel=0.01)
+
+
+def test_its_title_has_the_number_of_the_archive_and_its_caption_that_stations_are_few() -> None:
+    """Seven stations to a period miss what every step has; all of them miss nothing."""
+    every = studies.run(stops(sweep={}))
+    results = Results.of(every)
+    steps = results.trace("midspan", ()).times
+    seldom = round(2.0 * np.pi / (7.0 * float(theory.first_omega(results)) * (steps[1] - steps[0])))
+    few = studies.run(stops(sweep={}, output={"residual": True, "histories": {"every": seldom}}))
+    size = quantity(float(few.midspan_residual), "m")
+    for found, too_few in ((few, True), (every, False)):
+        figure = drawn(found)["ringing"]
+        assert figure.title == f"midspan swings by up to {size} about its static value after the stop"
+        counted = re.search(r"Stations are too few for midspan, ([\d.]+) to a period", figure.caption)
+        assert float(counted[1]) == pytest.approx(7.0, abs=0.6) if counted else not too_few
+        assert bool(counted) == too_few
 
 
 @pytest.mark.parametrize("question", [LIMIT, {}])
