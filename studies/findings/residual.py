@@ -6,17 +6,18 @@ from engine.scene.study import Study
 from engine.study_file.spec import Spec
 from results_schema.arrays import Array
 from studies.findings.absolute_errors import absolute_errors, told_error
+from studies.findings.amplification import only_rounding, sizes
 from studies.findings.beyond import LIMITED, Limits, in_turns, where_beyond
 from studies.findings.effects import by_effect
 from studies.results.axes import VARIANT
 from studies.results.findings_common import in_words
-from studies.results.formatting import counted, quantity
+from studies.results.formatting import ROUNDING, counted, quantity
 from studies.results.places import Index, extreme
 from studies.results.results import Results
 
 MOST_SENSORS = 4
-LAST = 6  # values along a swept number that are looked at
-TURNS = 3  # of the four that these can have: what is swept too coarsely goes up and down from one to the next
+LAST = 8  # values along a swept number that are looked at: where it is swept too coarsely most of them turn
+FEWEST = 6  # of these
 LEAST_STEP = 0.1  # of the largest value: smaller ones do not count as up or down
 
 
@@ -46,6 +47,12 @@ def settling_of(results: Results, sensor: str) -> Array:
     return np.where(results.with_values, values, np.nan)
 
 
+def quiet(results: Results, sensor: str) -> bool:
+    """Whether what is left of a sensor's vibration is rounding, or all of its reading is."""
+    left, scale = (float(np.nanmax(of(results, sensor), initial=0.0)) for of in (residual_of, sizes))
+    return only_rounding(results, sensor) or left <= ROUNDING * scale
+
+
 def ringing(results: Results, limits: Limits) -> list[str]:
     """Sensors whose residual vibration is told, in the order of `in_turns`; none where the study does not tell it."""
     if not results.study.output.residual:
@@ -72,6 +79,8 @@ def _residual(results: Results, sensor: str, limits: Limits) -> str:
     if place is None:
         return f"{sensor}: no variant has a residual vibration."
     size = float(values[place])
+    if quiet(results, sensor):
+        return f"{sensor}: at rest it does not swing."
     error = float(absolute_errors(results, f"{sensor}_residual")[place])  # parts of a static value mislead here
     said = (
         f"{sensor}: at rest it still swings by up to {quantity(size, units)}"
@@ -96,7 +105,8 @@ def _told_between(results: Results, values: Array, place: Index) -> str:
         line = values[tuple(slice(None) if n == along else at for n, at in enumerate(place))][np.argsort(axis.values)]
         steps = np.diff(line[-LAST:])
         steps = np.sign(steps[np.abs(steps) > LEAST_STEP * np.nanmax(line)])
-        if np.count_nonzero(np.diff(steps)) >= TURNS:
+        turns = np.count_nonzero(np.diff(steps))
+        if line.size >= FEWEST and turns > (min(line.size, LAST) - 2) / 2:
             return (
                 f" From one {axis.noun} to the next it goes up and down, so peaks between them may be higher: sweep "
                 "them more closely."

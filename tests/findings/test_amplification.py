@@ -52,6 +52,36 @@ def test_an_answer_says_as_large_where_nothing_is_amplified() -> None:
     assert " as large as the static " in said and " 1 times" not in said
 
 
+def test_no_place_is_told_of_what_is_the_same_everywhere_as_it_is_told() -> None:
+    """A largest value that differs by less than its three digits, and an amplification that does."""
+    masses = 'mass = { of = "carriage.table.mass", values = [50, 100] }'
+    dataset = studies.run(load(scenes.text_of("passage", masses)))
+    gain = dataset["dynamic_amplification"].sel(sensor="midspan")
+    dataset["midspan_max"][:], dataset["midspan_min"][:], gain[:] = [1.23e-5, 1.2304e-5], 0.0, [1.3, 1.2]
+    (said,) = (one for one in answers.answer(dataset) if one.startswith("midspan"))
+    assert " and hardly changes over mass 50 kg to 100 kg; relative to statics it is largest at mass 50 kg: 1.3" in said
+    assert "at mass 100 kg" not in said and said.count("hardly changes") == 1
+    gain[:] = [1.0001, 1.0]
+    (said,) = (one for one in answers.answer(dataset) if one.startswith("midspan"))
+    assert ", as large as the static 12.3 µm, and hardly changes over mass 50 kg to 100 kg." in said
+    dataset["midspan_max"][:] = [1.23e-5, 1.44e-5]
+    (said,) = (one for one in answers.answer(dataset) if one.startswith("midspan"))
+    assert ", as large as the static 14.4 µm, at mass 100 kg." in said
+
+
+def test_rounding_is_not_told_as_a_number() -> None:
+    """Of a sensor beside one that reads a billion times as much in its unit, and of halves of a cycle."""
+    other = "[sensor.quiet]\nbody = 'bed'\nat = 2.0\n"
+    dataset = studies.run(load(scenes.text_of("passage", extra=other)))
+    dataset["quiet_max"][...], dataset["quiet_min"][...] = 1e-25, -2e-25
+    (said,) = (one for one in answers.answer(dataset) if one.startswith("quiet"))
+    assert said == "quiet: it reads nothing but rounding."
+    halves = studies.run(load(scenes.text_of("double-peak")))
+    for ratio, told in ((4e-16, "are alike."), (0.01, "are alike; odd harmonics are at most 1 % of the even.")):
+        halves["odd_even_ratio"][...] = ratio
+        assert any(one.endswith(f"midspan: the two halves of a cycle {told}") for one in answers.answer(halves))
+
+
 @pytest.mark.parametrize("kind", ["passage", "asymmetry", "double-peak", "trajectory"])
 def test_sentences_about_one_variant_end_without_a_comma(kind: str) -> None:
     """Where nothing is swept there is no place in the sweep to name: "1.12 times the static 39.4 mm,."."""

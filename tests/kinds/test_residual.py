@@ -229,3 +229,13 @@ def test_values_that_go_up_and_down_from_one_to_the_next_are_swept_too_coarsely(
     assert told_of([1e-6, 2e-6, 6.3e-6, 4.6e-6, 7.4e-6, 4.1e-6, 8.2e-6, 6.7e-6]).endswith(hint)
     for calm in ([1e-6, 2e-6, 4e-6, 3e-6, 2e-6, 1e-6, 5e-6], [1e-6, 4e-6, 3.8e-6, 4.0e-6, 3.8e-6, 4.1e-6, 3.9e-6]):
         assert "goes up and down" not in told_of(calm)
+
+
+def test_what_is_left_as_rounding_does_not_swing() -> None:
+    """It is told and drawn without a number."""
+    found = studies.run(stops(sensor={"quarter": {"body": "bed", "at": 0.25}, "midspan": {"body": "bed", "at": 0.5}}))
+    found["quarter_residual"][:] = 1e-10 * float(found["quarter_max"].max())
+    told = [text for text in answers.answer(found) if "at rest" in text]
+    assert "quarter: at rest it does not swing." in told and "midspan: at rest it still swings" in told[0]
+    figure = drawn(found)["residual"]
+    assert len(figure.drawing.axes) == 1 and figure.title.startswith("midspan still swings")

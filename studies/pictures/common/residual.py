@@ -14,7 +14,7 @@ from results_schema.arrays import Array
 from studies.findings.absolute_errors import absolute_errors
 from studies.findings.beyond import Limits
 from studies.findings.effects import by_effect
-from studies.findings.residual import MOST_SENSORS, residual_of, ringing, settling_of
+from studies.findings.residual import MOST_SENSORS, quiet, residual_of, ringing, settling_of
 from studies.pictures.common.figures import (
     BLUE,
     Figure,
@@ -53,7 +53,8 @@ class Row(NamedTuple):
 def pictures(results: Results, limits: Limits) -> list[Figure]:
     """Over the sweep and over time, of sensors that swing on, and how long they take to settle; none where the study
     does not tell it."""
-    told = [sensor for sensor in ringing(results, limits) if np.isfinite(residual_of(results, sensor)).any()]
+    known = (sensor for sensor in ringing(results, limits) if np.isfinite(residual_of(results, sensor)).any())
+    told = [sensor for sensor in known if not quiet(results, sensor)]
     if not told:
         return []
     sensors, values = told[:MOST_SENSORS], residual_of(results, told[0])
