@@ -157,7 +157,7 @@ def _ranges(found: Sequence[Range], percentiles: Sequence[float]) -> None:
         (
             _name(one),
             *(one.value(value) for value in (one.smallest.value, *one.percentiles, one.largest.value)),
-            f"{'largest' if one.telling is one.largest else 'smallest'} at {one.telling.where.replace('_', ' ')}",
+            _where(one),
         )
         for one in found
         if not one.is_constant
@@ -176,6 +176,13 @@ def _ranges(found: Sequence[Range], percentiles: Sequence[float]) -> None:
     loose = [f"{_name(one)} {one.said(one.extreme)}" for one in found if one.is_loose]
     if loose:
         paragraphs(f"By their told errors hardly known: {', '.join(loose)}.")
+
+
+def _where(found: Range) -> str:
+    """Where the end of a range is that tells most; "" where both are told by the same digits."""
+    if found.value(found.smallest.value) == found.value(found.largest.value):
+        return ""
+    return f"{'largest' if found.telling is found.largest else 'smallest'} at {found.telling.where.replace('_', ' ')}"
 
 
 def _percentiles(results: Results, shown: Sequence[str]) -> None:

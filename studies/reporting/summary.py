@@ -14,6 +14,7 @@ from results_schema.lazy_imports import xr
 from results_schema.status import Status, label
 from studies.at_rest.errors import errors_along
 from studies.findings.absolute_errors import absolute_errors, told_error
+from studies.findings.amplification import sizes
 from studies.findings.numerics_used import ERROR, WORK, is_marched
 from studies.protocol.study import kind_named
 from studies.results.axes import VARIANT
@@ -93,7 +94,8 @@ class Range:
     @property
     def is_loose(self) -> bool:
         """Whether its end of larger magnitude may be off by much of itself."""
-        return bool(told_error(self.extreme.error, self.extreme.value, self.units))
+        known = self.extreme.error > NOISE * self.beside
+        return known and bool(told_error(self.extreme.error, self.extreme.value, self.units))
 
     def value(self, value: float, digits: int = 3) -> str:
         """One of its values with the unit."""
@@ -101,7 +103,7 @@ class Range:
 
     def said(self, end: Extreme, digits: int = 3) -> str:
         """One of its ends with the unit, and what that may be off where that is known and not beneath its digits."""
-        beneath = LEAST_TOLD * abs(end.value)
+        beneath = max(LEAST_TOLD * abs(end.value), NOISE * self.beside)
         off = f" ± {quantity(end.error, self.units, 2)}" if np.isfinite(end.error) and end.error > beneath else ""
         return f"{self.value(end.value, digits)}{off}"
 
@@ -248,7 +250,16 @@ def _range(study_results: Results, name: str, sensor: str, array: xr.DataArray) 
     stem = name.removesuffix("_max").removesuffix("_min")
     both = [results[f"{stem}_{end}"].values for end in ("max", "min") if f"{stem}_{end}" in results]
     beside = max((float(np.nanmax(np.abs(one))) for one in both), default=0.0)
+    beside = max(beside, _largest_alike(study_results, stem.removesuffix("_residual").removesuffix("_rms")))
     yield Range(name, sensor, units, smallest, largest, tuple(map(float, percentiles)), beside, having)
+
+
+def _largest_alike(results: Results, sensor: str) -> float:
+    """The largest magnitude of all sensors of its unit: what is rounding beside it is nothing."""
+    units = results.sensors.get(sensor)
+    known = results.dataset.data_vars.keys()
+    alike = [name for name, own in results.sensors.items() if own == units and {f"{name}_max", f"{name}_min"} <= known]
+    return max((float(np.nanmax(sizes(results, name), initial=0.0)) for name in alike), default=0.0)
 
 
 def _extreme(results: Results, array: xr.DataArray, flat: np.intp, errors: Array | None) -> Extreme:

@@ -6,9 +6,10 @@ import xarray as xr
 
 import studies
 from engine.scene.study import Study, load
+from studies.commands import screens
 from studies.findings.amplification import sizes, with_derived_errors
 from studies.protocol.study import kind_of
-from studies.reporting import answers
+from studies.reporting import answers, summary
 from studies.results.results import Results
 from tests.engine.build import beam, cruise, fixed, mass
 from tests.engine.build import study as built
@@ -61,6 +62,8 @@ def test_no_place_is_told_of_what_is_the_same_everywhere_as_it_is_told() -> None
     (said,) = (one for one in answers.answer(dataset) if one.startswith("midspan"))
     assert " and hardly changes over mass 50 kg to 100 kg; relative to statics it is largest at mass 50 kg: 1.3" in said
     assert "at mass 100 kg" not in said and said.count("hardly changes") == 1
+    ends = {f"{one.name} {one.sensor}": screens._where(one) for one in summary.in_tables(Results.of(dataset))}
+    assert ends["midspan_max "] == "" and ends["dynamic_amplification midspan"] == "largest at mass 50 kg"
     gain[:] = [1.0001, 1.0]
     (said,) = (one for one in answers.answer(dataset) if one.startswith("midspan"))
     assert ", as large as the static 12.3 µm, and hardly changes over mass 50 kg to 100 kg." in said
@@ -76,6 +79,8 @@ def test_rounding_is_not_told_as_a_number() -> None:
     dataset["quiet_max"][...], dataset["quiet_min"][...] = 1e-25, -2e-25
     (said,) = (one for one in answers.answer(dataset) if one.startswith("quiet"))
     assert said == "quiet: it reads nothing but rounding."
+    told = {one.name: one.said(one.extreme) for one in summary.in_tables(Results.of(dataset)) if not one.is_loose}
+    assert told["quiet_max"] == told["quiet_min"] == "0 m" != told["midspan_max"]
     halves = studies.run(load(scenes.text_of("double-peak")))
     for ratio, told in ((4e-16, "are alike."), (0.01, "are alike; odd harmonics are at most 1 % of the even.")):
         halves["odd_even_ratio"][...] = ratio
