@@ -157,7 +157,7 @@ def _ranges(found: Sequence[Range], percentiles: Sequence[float]) -> None:
         (
             _name(one),
             *(one.value(value) for value in (one.smallest.value, *one.percentiles, one.largest.value)),
-            f"{'largest' if one.telling is one.largest else 'smallest'} at {one.telling.where.replace('_', ' ')}",
+            _where(one),
         )
         for one in found
         if not one.is_constant
@@ -166,13 +166,23 @@ def _ranges(found: Sequence[Range], percentiles: Sequence[float]) -> None:
         table("", ("result", "smallest", *parts, "largest", ""), rows[:MOST_ROWS], tallest=TALLEST)
     if rows[MOST_ROWS:]:
         paragraphs(f"{len(rows) - MOST_ROWS} more results: run -v, or the report.")
-    same = [f"{_name(one)} {one.value(one.largest.value)}" for one in found if one.is_constant]
+    alike = [(one, f"{_name(one)} {one.value(one.largest.value)}") for one in found if one.is_constant]
+    same = [words for one, words in alike if not one.partly]
     if same:
         more = f" and {len(same) - MOST_ALIKE} more" if len(same) > MOST_ALIKE else ""
         paragraphs(f"The same in every variant: {', '.join(same[:MOST_ALIKE])}{more}.")
+    if some := [f"{words} {one.partly}" for one, words in alike if one.partly]:
+        paragraphs(f"The same where there is one: {', '.join(some[:MOST_ALIKE])}.")
     loose = [f"{_name(one)} {one.said(one.extreme)}" for one in found if one.is_loose]
     if loose:
         paragraphs(f"By their told errors hardly known: {', '.join(loose)}.")
+
+
+def _where(found: Range) -> str:
+    """Where the end of a range is that tells most; "" where both are told by the same digits."""
+    if found.value(found.smallest.value) == found.value(found.largest.value):
+        return ""
+    return f"{'largest' if found.telling is found.largest else 'smallest'} at {found.telling.where.replace('_', ' ')}"
 
 
 def _percentiles(results: Results, shown: Sequence[str]) -> None:

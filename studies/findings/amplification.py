@@ -10,6 +10,7 @@ from engine.scene.study import Study
 from results_schema.arrays import Array
 from results_schema.lazy_imports import xr
 from results_schema.variable import outputs
+from studies.results.formatting import ROUNDING
 from studies.results.places import Index, extreme
 from studies.results.results import Results
 
@@ -24,6 +25,13 @@ def sizes(results: Results, sensor: str) -> Array:
     """The largest absolute value of a sensor, in the sweep's shape."""
     sides = (results.dataset[f"{sensor}_{side}"].transpose(*results.dims) for side in ("max", "min"))
     return np.asarray(np.maximum(*(np.abs(side.values) for side in sides)), dtype=np.float64)
+
+
+def only_rounding(results: Results, sensor: str) -> bool:
+    """Whether a sensor reads nothing, as all of its values are rounding beside those of another one in its unit."""
+    alike = [name for name, units in results.sensors.items() if units == results.sensors[sensor]]
+    scale = max(float(np.nanmax(sizes(results, name), initial=0.0)) for name in alike)
+    return scale > 0.0 and float(np.nanmax(sizes(results, sensor), initial=0.0)) <= ROUNDING * scale
 
 
 def size_errors(results: Results, sensor: str) -> Array:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from results_schema.arrays import Array
@@ -20,11 +22,25 @@ def unchanged(results: Results, values: Array) -> str:
     """That values (in the sweep's shape) do not change over it, as the end of a sentence; "" where they change by
     more than rounding, or nothing is swept."""
     known = values[results.with_values & np.isfinite(values)]
-    varied = [axis for axis in results.axes if len(axis.values) > 1]
-    if known.size < 2 or not varied or np.ptp(known) > ALIKE * np.abs(known).max():
+    over = _over_all(results)
+    if known.size < 2 or not over or np.ptp(known) > ALIKE * np.abs(known).max():
         return ""
+    return f"does not change {over}"
+
+
+def hardly_changed(results: Results, values: Array, words: Callable[[float], str]) -> str:
+    """That values (in the sweep's shape) change by less over it than words show, as the end of a sentence; "" where
+    they do not, or nothing is swept: where the largest is would say nothing."""
+    known, over = values[results.with_values & np.isfinite(values)], _over_all(results)
+    alike = known.size > 1 and words(float(known.min())) == words(float(known.max()))
+    return f"hardly changes {over}" if alike and over else ""
+
+
+def _over_all(results: Results) -> str:
+    """Over what is swept; "" without a sweep."""
+    varied = [axis for axis in results.axes if len(axis.values) > 1]
     over = [f"{axis.noun} {axis.span}" for axis in varied[:MOST_AXES]]
-    return f"does not change over {listed(over) if len(varied) <= MOST_AXES else 'the sweep'}"
+    return f"over {listed(over) if len(varied) <= MOST_AXES else 'the sweep'}" if over else ""
 
 
 def by_effect(results: Results, values: Array) -> list[Axis]:

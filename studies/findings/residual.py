@@ -6,14 +6,19 @@ from engine.scene.study import Study
 from engine.study_file.spec import Spec
 from results_schema.arrays import Array
 from studies.findings.absolute_errors import absolute_errors, told_error
+from studies.findings.amplification import only_rounding, sizes
 from studies.findings.beyond import LIMITED, Limits, in_turns, where_beyond
 from studies.findings.effects import by_effect
+from studies.results.axes import VARIANT
 from studies.results.findings_common import in_words
-from studies.results.formatting import counted, quantity
+from studies.results.formatting import ROUNDING, counted, quantity
 from studies.results.places import Index, extreme
 from studies.results.results import Results
 
 MOST_SENSORS = 4
+LAST = 8  # values along a swept number that are looked at: where it is swept too coarsely most of them turn
+FEWEST = 6  # of these
+LEAST_STEP = 0.1  # of the largest value: smaller ones do not count as up or down
 
 
 class AskedOfRest(Spec):
@@ -42,6 +47,12 @@ def settling_of(results: Results, sensor: str) -> Array:
     return np.where(results.with_values, values, np.nan)
 
 
+def quiet(results: Results, sensor: str) -> bool:
+    """Whether what is left of a sensor's vibration is rounding, or all of its reading is."""
+    left, scale = (float(np.nanmax(of(results, sensor), initial=0.0)) for of in (residual_of, sizes))
+    return only_rounding(results, sensor) or left <= ROUNDING * scale
+
+
 def ringing(results: Results, limits: Limits) -> list[str]:
     """Sensors whose residual vibration is told, in the order of `in_turns`; none where the study does not tell it."""
     if not results.study.output.residual:
@@ -68,17 +79,39 @@ def _residual(results: Results, sensor: str, limits: Limits) -> str:
     if place is None:
         return f"{sensor}: no variant has a residual vibration."
     size = float(values[place])
+    if quiet(results, sensor):
+        return f"{sensor}: at rest it does not swing."
     error = float(absolute_errors(results, f"{sensor}_residual")[place])  # parts of a static value mislead here
     said = (
         f"{sensor}: at rest it still swings by up to {quantity(size, units)}"
         f"{told_error(error, size, units)}{in_words(results, place)}"
     )
     limit, settled = limits.limit(results.study.sensor[sensor].quantity), _settled(results, sensor)
+    between = _told_between(results, values, place)
     if limit is None:
-        return f"{said}{settled}."
+        return f"{said}{settled}.{between}"
     axis = next(iter(by_effect(results, values)), None)
     over = f" of {axis.noun}" if axis is not None else ""
-    return f"{said}; it exceeds {quantity(limit, units)} {where_beyond(results, values, limit, axis)}{over}{settled}."
+    beyond = f"{quantity(limit, units)} {where_beyond(results, values, limit, axis)}"
+    return f"{said}; it exceeds {beyond}{over}{settled}.{between}"
+
+
+def _told_between(results: Results, values: Array, place: Index) -> str:
+    """That peaks may be higher between swept values where one is large and the next small, as a sentence behind
+    another; place: of the largest, through which each swept number is followed. "" where none does that."""
+    axes = [axis for axis in by_effect(results, values) if axis.dim != VARIANT]
+    for axis in axes:
+        along = results.dims.index(axis.dim)
+        line = values[tuple(slice(None) if n == along else at for n, at in enumerate(place))][np.argsort(axis.values)]
+        steps = np.diff(line[-LAST:])
+        steps = np.sign(steps[np.abs(steps) > LEAST_STEP * np.nanmax(line)])
+        turns = np.count_nonzero(np.diff(steps))
+        if line.size >= FEWEST and turns > (min(line.size, LAST) - 2) / 2:
+            return (
+                f" From one {axis.noun} to the next it goes up and down, so peaks between them may be higher: sweep "
+                "them more closely."
+            )
+    return ""
 
 
 def _settled(results: Results, sensor: str) -> str:
@@ -89,13 +122,15 @@ def _settled(results: Results, sensor: str) -> str:
     values = settling_of(results, sensor)
     left = int(np.count_nonzero(results.with_values & np.isnan(values)))
     place, units, said = extreme(values), results.sensors[sensor], list[str]()
+    known = int(np.count_nonzero(np.isfinite(values)))
     within = f"within {quantity(band, units)} of its static value"
+    among = f"in {known:,} of {counted(known + left, 'variant')} " if left else ""
     if place is not None and float(values[place]) == 0.0:
-        said.append(f"it is {within} from the stop on")
+        said.append(f"{among}it is {within} from the stop on")
     elif place is not None:
         took, error = float(values[place]), float(absolute_errors(results, f"{sensor}_settling_time")[place])
         when = f"{quantity(took, 's')}{told_error(error, took, 's')} after the stop at the latest"
-        said.append(f"it has settled {within} {when}{in_words(results, place)}")
+        said.append(f"{among}it has settled {within} {when}{in_words(results, place)}")
     if left:
         said.append(f"{counted(left, 'variant')} {'have' if left > 1 else 'has'} not settled by the end of the run")
     return "".join(f"; {one}" for one in said)

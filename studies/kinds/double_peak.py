@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,13 +19,14 @@ from results_schema.variable import outputs
 from results_schema.variables import AXES, MARCH, axes, declare
 from studies.findings import indices, theory
 from studies.findings.amplification import DYNAMIC_AMPLIFICATION, with_amplification, with_own_weight
+from studies.findings.effects import hardly_changed
 from studies.findings.peaks import PEAKS, peaks
 from studies.findings.settled import told_unsettled
 from studies.findings.two_peaks import EXPECTED, first_break, pattern, peaks_in_words, slowest
 from studies.protocol.study import Kind
 from studies.results.axes import PACES
 from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses, uncertainty
-from studies.results.formatting import MINUS, counted, listed, number, percent, times
+from studies.results.formatting import MINUS, ROUNDING, counted, listed, number, percent, times
 from studies.results.places import Index, chosen, extreme
 from studies.results.results import Results
 
@@ -318,7 +320,8 @@ def _amplified(results: Results, sensor: str) -> list[str]:
         return []
     result = f"dynamic_amplification {sensor}"
     loosely = with_own_weight(results.study, sensor) + uncertainty(results, result, top)
-    said = f"{sensor}: at most {times(float(gain[top]), 'the static value', 4)}{loosely}{in_words(results, top)}"
+    where = "" if hardly_changed(results, gain, partial(number, digits=4)) else in_words(results, top)
+    said = f"{sensor}: at most {times(float(gain[top]), 'the static value', 4)}{loosely}{where}"
     if slow is None or slow == top:
         return [f"{said}{_rule(results, sensor, top)}."]
     below = f"below {number(SLOW)} of the first natural frequency at most {times(float(gain[slow]), digits=4)}"
@@ -343,8 +346,8 @@ def _halves(results: Results, sensor: str) -> list[str]:
         return []
     largest = float(np.asarray(ratio.values)[place])
     if largest < SYMMETRIC:
-        alike = f"odd harmonics are at most {percent(largest)} of the even"
-        return [f"{sensor}: the two halves of a cycle are alike; {alike}."]
+        alike = f"; odd harmonics are at most {percent(largest)} of the even" if largest > ROUNDING else ""
+        return [f"{sensor}: the two halves of a cycle are alike{alike}."]
     start = _from_where(results, np.asarray(ratio.values))
     return [
         f"{sensor}: the two halves of a cycle differ{start}; odd harmonics reach {number(largest)} times the even"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
@@ -14,13 +15,14 @@ from studies.findings.absolute_errors import absolute_errors, errors_of_size, we
 from studies.findings.amplification import (
     DYNAMIC_AMPLIFICATION,
     largest,
+    only_rounding,
     sizes,
     with_amplification,
     with_own_weight,
 )
 from studies.findings.between_speeds import told_between_speeds
 from studies.findings.beyond import LIMIT, MOST_TOLD, AskedOfPassages, ranked, told_limit, where_beyond
-from studies.findings.effects import told_effects, unchanged
+from studies.findings.effects import hardly_changed, told_effects, unchanged
 from studies.findings.envelopes import beyond_sensors, sizes_along, told_along
 from studies.findings.residual import check_residual, most_ringing, residuals
 from studies.protocol.study import Kind, question_of
@@ -59,7 +61,12 @@ class Passage(Kind):
     def findings(self, results: Results) -> list[str]:
         told, (envelopes, sensors) = (_largest, _amplified, _limited), _told(results)
         said = [told_along(results, name) for name in envelopes]
-        said += ["".join(tell(results, sensor) for tell in told) for sensor in sensors]
+        said += [
+            f"{sensor}: it reads nothing but rounding."
+            if only_rounding(results, sensor)
+            else "".join(tell(results, sensor) for tell in told)
+            for sensor in sensors
+        ]
         said = _with_remark(said, told_between_speeds(results))
         if sensors:  # of which those after the first may be cut
             said[len(envelopes)] += _amplified_besides(results, sensors[0])
@@ -107,6 +114,9 @@ def _largest(results: Results, sensor: str) -> str:
     if same := unchanged(results, sizes(results, sensor)):
         return f"{said} and {same}."
     where = f"{in_words(results, top)}{_at_the_end(results, top)}"
+    level = hardly_changed(results, sizes(results, sensor), partial(quantity, units=results.sensors[sensor]))
+    where = f" and {level}" if level else where
+    best = top if best is not None and hardly_changed(results, gain, number) else best
     if best is None:
         return f"{said}{where}."
     static = sizes(results, sensor)[best] / gain[best]
@@ -129,6 +139,8 @@ def _effects(results: Results, envelopes: list[str], sensors: list[str]) -> str:
         )
     else:
         what, values = results.noun(sensors[0]), sizes(results, sensors[0])
+        if hardly_changed(results, values, partial(quantity, units=results.sensors[sensors[0]])):
+            return ""
     said = told_effects(results, values, f"the largest {what}")
     return f" {said}" if said else ""
 

@@ -282,6 +282,8 @@ def _carriages(scene: Layout, study: Study) -> Table:
         force, (low, high) = float(weight(model, values, index)[0]), carriage.motion.range()
         s = np.linspace(max(low, 0.0), min(high, modal.length), PROBED)
         sag = "" if modal.rigid_modes else quantity(float(np.abs(modal.influence_at(s, s)).max()) * abs(force), "m")
+        if sag and len(carriage.riding_contacts) > 1:  # which share it
+            sag += " of its weight at one point"
         way = f"{number(low, 4)} to {number(high, 4)} m, {carriage.motion.kind}"
         mass = float(moving_mass(model, values, index)[0])
         rows.append(

@@ -192,7 +192,7 @@ def page_template(name: str) -> Template:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"soft": _soft, "minus": _minus, "unbroken": _unbroken}
+    environment.filters |= {"soft": _soft, "minus": _minus, "coded": _coded, "unbroken": _unbroken}
     return environment.get_template(name)
 
 
@@ -209,6 +209,15 @@ def _minus(text: str) -> str:
     """
     text = re.sub(r"(?<![\w.-])-(?=\d)", "\N{MINUS SIGN}", text)
     return UNIT.sub("\N{NO-BREAK SPACE}", text)
+
+
+def _coded(text: str) -> Markup:
+    """What stands between back-ticks as code.
+
+    >>> print(_coded("a `tolerance < 1` on <b>, ` alone"))
+    a <code>tolerance &lt; 1</code> on &lt;b&gt;, ` alone
+    """
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text))))
 
 
 def _unbroken(text: str) -> str:
@@ -332,7 +341,7 @@ def _results(results: Results) -> list[tuple[str, ...]]:
     for found in in_tables(results):
         both = (found.smallest, found.largest)
         ends, alike = [found.said(end, 4) for end in both], found.is_constant and results.size > 1
-        low, high = (EVERYWHERE if alike else end.where for end in both)
+        low, high = ((found.partly or EVERYWHERE) if alike else end.where for end in both)
         between = [found.value(value, 4) for value in found.percentiles]
         rows.append((found.name, found.sensor, ends[0], low, ends[1], high, *between))
     return rows

@@ -14,11 +14,12 @@ from results_schema.lazy_imports import xr
 from results_schema.status import Status, label
 from studies.at_rest.errors import errors_along
 from studies.findings.absolute_errors import absolute_errors, told_error
+from studies.findings.amplification import sizes
 from studies.findings.numerics_used import ERROR, WORK, is_marched
 from studies.protocol.study import kind_named
 from studies.results.axes import VARIANT
 from studies.results.cells import End, cell_ranges, counts_of, single_numbers, words_of
-from studies.results.formatting import ALIKE, NOISE, quantity
+from studies.results.formatting import ALIKE, NOISE, counted, quantity
 from studies.results.results import Results
 from studies.runs.audit import Verdict
 from studies.runs.audit import as_json as audit_as_json
@@ -55,6 +56,7 @@ class Range:
     """Smallest and largest of a result over all variants that have one. sensor: "" where it is of no sensor.
 
     percentiles: its value at each of `output.percentiles`. beside: the largest magnitude of that of which it is an end.
+    having: how many variants have it, and how many have results: a settling time is not there where none has settled.
     """
 
     name: str
@@ -64,6 +66,7 @@ class Range:
     largest: Extreme
     percentiles: tuple[float, ...] = ()
     beside: float = 0.0
+    having: tuple[int, int] = (0, 0)
 
     @property
     def extreme(self) -> Extreme:
@@ -83,9 +86,16 @@ class Range:
         return self.largest.value - self.smallest.value <= max(ALIKE * abs(self.extreme.value), NOISE * self.beside)
 
     @property
+    def partly(self) -> str:
+        """In how many variants it is where some of them lack it; "" else."""
+        own, of = self.having
+        return f"in {own:,} of {counted(of, 'variant')}" if own < of else ""
+
+    @property
     def is_loose(self) -> bool:
         """Whether its end of larger magnitude may be off by much of itself."""
-        return bool(told_error(self.extreme.error, self.extreme.value, self.units))
+        known = self.extreme.error > NOISE * self.beside
+        return known and bool(told_error(self.extreme.error, self.extreme.value, self.units))
 
     def value(self, value: float, digits: int = 3) -> str:
         """One of its values with the unit."""
@@ -93,7 +103,7 @@ class Range:
 
     def said(self, end: Extreme, digits: int = 3) -> str:
         """One of its ends with the unit, and what that may be off where that is known and not beneath its digits."""
-        beneath = LEAST_TOLD * abs(end.value)
+        beneath = max(LEAST_TOLD * abs(end.value), NOISE * self.beside)
         off = f" ± {quantity(end.error, self.units, 2)}" if np.isfinite(end.error) and end.error > beneath else ""
         return f"{self.value(end.value, digits)}{off}"
 
@@ -234,11 +244,22 @@ def _range(study_results: Results, name: str, sensor: str, array: xr.DataArray) 
     if "position" in array.dims:
         errors = errors_along(study_results, name)
     smallest, largest = (_extreme(study_results, array, pick(values), errors) for pick in (np.nanargmin, np.nanargmax))
+    kept = np.asarray(study_results.kept.values)
+    having = (int(np.isfinite(values[kept]).sum()), int(kept.sum())) if array.dims == study_results.dims else (0, 0)
     percentiles = np.nanpercentile(values, study_results.study.output.percentiles)
     stem = name.removesuffix("_max").removesuffix("_min")
     both = [results[f"{stem}_{end}"].values for end in ("max", "min") if f"{stem}_{end}" in results]
     beside = max((float(np.nanmax(np.abs(one))) for one in both), default=0.0)
-    yield Range(name, sensor, units, smallest, largest, tuple(map(float, percentiles)), beside)
+    beside = max(beside, _largest_alike(study_results, stem.removesuffix("_residual").removesuffix("_rms")))
+    yield Range(name, sensor, units, smallest, largest, tuple(map(float, percentiles)), beside, having)
+
+
+def _largest_alike(results: Results, sensor: str) -> float:
+    """The largest magnitude of all sensors of its unit: what is rounding beside it is nothing."""
+    units = results.sensors.get(sensor)
+    known = results.dataset.data_vars.keys()
+    alike = [name for name, own in results.sensors.items() if own == units and {f"{name}_max", f"{name}_min"} <= known]
+    return max((float(np.nanmax(sizes(results, name), initial=0.0)) for name in alike), default=0.0)
 
 
 def _extreme(results: Results, array: xr.DataArray, flat: np.intp, errors: Array | None) -> Extreme:

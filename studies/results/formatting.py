@@ -14,6 +14,7 @@ _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 MINUS = "\N{MINUS SIGN}"
 _PREFIXED = ("m", "N", "N m", "Pa", "J")
 NOISE = 1e-12  # of the largest value beside it: what is smaller is rounding
+ROUNDING = 1e-9  # of the scale of a result: what a long march leaves of what is nothing
 ALIKE = 1e-6  # of the largest value: a smaller range of values is rounding
 _METRES = (-9, -6, -3, 0)
 

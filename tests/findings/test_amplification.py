@@ -6,9 +6,10 @@ import xarray as xr
 
 import studies
 from engine.scene.study import Study, load
+from studies.commands import screens
 from studies.findings.amplification import sizes, with_derived_errors
 from studies.protocol.study import kind_of
-from studies.reporting import answers
+from studies.reporting import answers, summary
 from studies.results.results import Results
 from tests.engine.build import beam, cruise, fixed, mass
 from tests.engine.build import study as built
@@ -50,6 +51,40 @@ def test_an_answer_says_as_large_where_nothing_is_amplified() -> None:
     dataset = studies.run(load(scenes.text_of("passage", masses, extra="[solver]\nfidelity = 'static'")))
     (said,) = (one for one in answers.answer(dataset) if one.startswith("midspan"))
     assert " as large as the static " in said and " 1 times" not in said
+
+
+def test_no_place_is_told_of_what_is_the_same_everywhere_as_it_is_told() -> None:
+    """A largest value that differs by less than its three digits, and an amplification that does."""
+    masses = 'mass = { of = "carriage.table.mass", values = [50, 100] }'
+    dataset = studies.run(load(scenes.text_of("passage", masses)))
+    gain = dataset["dynamic_amplification"].sel(sensor="midspan")
+    dataset["midspan_max"][:], dataset["midspan_min"][:], gain[:] = [1.23e-5, 1.2304e-5], 0.0, [1.3, 1.2]
+    (said,) = (one for one in answers.answer(dataset) if one.startswith("midspan"))
+    assert " and hardly changes over mass 50 kg to 100 kg; relative to statics it is largest at mass 50 kg: 1.3" in said
+    assert "at mass 100 kg" not in said and said.count("hardly changes") == 1
+    ends = {f"{one.name} {one.sensor}": screens._where(one) for one in summary.in_tables(Results.of(dataset))}
+    assert ends["midspan_max "] == "" and ends["dynamic_amplification midspan"] == "largest at mass 50 kg"
+    gain[:] = [1.0001, 1.0]
+    (said,) = (one for one in answers.answer(dataset) if one.startswith("midspan"))
+    assert ", as large as the static 12.3 µm, and hardly changes over mass 50 kg to 100 kg." in said
+    dataset["midspan_max"][:] = [1.23e-5, 1.44e-5]
+    (said,) = (one for one in answers.answer(dataset) if one.startswith("midspan"))
+    assert ", as large as the static 14.4 µm, at mass 100 kg." in said
+
+
+def test_rounding_is_not_told_as_a_number() -> None:
+    """Of a sensor beside one that reads a billion times as much in its unit, and of halves of a cycle."""
+    other = "[sensor.quiet]\nbody = 'bed'\nat = 2.0\n"
+    dataset = studies.run(load(scenes.text_of("passage", extra=other)))
+    dataset["quiet_max"][...], dataset["quiet_min"][...] = 1e-25, -2e-25
+    (said,) = (one for one in answers.answer(dataset) if one.startswith("quiet"))
+    assert said == "quiet: it reads nothing but rounding."
+    told = {one.name: one.said(one.extreme) for one in summary.in_tables(Results.of(dataset)) if not one.is_loose}
+    assert told["quiet_max"] == told["quiet_min"] == "0 m" != told["midspan_max"]
+    halves = studies.run(load(scenes.text_of("double-peak")))
+    for ratio, told in ((4e-16, "are alike."), (0.01, "are alike; odd harmonics are at most 1 % of the even.")):
+        halves["odd_even_ratio"][...] = ratio
+        assert any(one.endswith(f"midspan: the two halves of a cycle {told}") for one in answers.answer(halves))
 
 
 @pytest.mark.parametrize("kind", ["passage", "asymmetry", "double-peak", "trajectory"])

@@ -11,9 +11,12 @@ import engine
 import studies
 from engine.scene.study import Study, load
 from results_schema.errors import BadInput
+from studies.commands import screens
+from studies.findings import theory
 from studies.findings.absolute_errors import absolute_errors
 from studies.protocol.study import kind_of
-from studies.reporting import answers
+from studies.reporting import answers, summary
+from studies.results.formatting import quantity
 from studies.results.results import Results
 from tests.engine.build import beam, force, study
 
@@ -100,6 +103,22 @@ def test_it_is_drawn_over_the_time_after_the_stop() -> None:
     assert np.ptp(values) == pytest.approx(2e3 * float(found.midspan_residual), rel=0.01)
 
 
+def test_its_title_has_the_number_of_the_archive_and_its_caption_that_stations_are_few() -> None:
+    """Seven stations to a period miss what every step has; all of them miss nothing."""
+    every = studies.run(stops(sweep={}))
+    results = Results.of(every)
+    steps = results.trace("midspan", ()).times
+    seldom = round(2.0 * np.pi / (7.0 * float(theory.first_omega(results)) * (steps[1] - steps[0])))
+    few = studies.run(stops(sweep={}, output={"residual": True, "histories": {"every": seldom}}))
+    size = quantity(float(few.midspan_residual), "m")
+    for found, too_few in ((few, True), (every, False)):
+        figure = drawn(found)["ringing"]
+        assert figure.title == f"midspan swings by up to {size} about its static value after the stop"
+        counted = re.search(r"Stations are too few for midspan, ([\d.]+) to a period", figure.caption)
+        assert float(counted[1]) == pytest.approx(7.0, abs=0.6) if counted else not too_few
+        assert bool(counted) == too_few
+
+
 @pytest.mark.parametrize("question", [LIMIT, {}])
 def test_sensors_nearest_to_their_limits_or_that_swing_most_come_first(question: dict[str, Any]) -> None:
     sensors = {"quarter": {"body": "bed", "at": 0.25}, "midspan": {"body": "bed", "at": 0.5}}
@@ -167,3 +186,56 @@ def test_it_is_said_how_long_it_takes_to_settle() -> None:
     (axes,) = figure.drawing.axes
     np.testing.assert_allclose(axes.lines[0].get_ydata(), times, rtol=1e-6)
     assert axes.get_ylabel() == "settling time (s)"
+
+
+def test_what_has_not_settled_everywhere_is_not_the_same_everywhere(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A settling time that one of two variants lacks: both sentences and tables tell of how many it is."""
+    sensors = {"midspan": {"body": "bed", "at": 0.5, "settling_band": 17.5e-3}}
+    swept = {"acceleration": SWEPT["acceleration"] | {"values": [2, 6]}}
+    found = studies.run(stops(sensor=sensors, sweep=swept))
+    np.testing.assert_array_equal(found.midspan_settling_time, [0.0, np.nan])
+    (said,) = (text for text in answers.answer(found) if "at rest" in text)
+    assert said.endswith(
+        "; in 1 of 2 variants it is within 17.5 mm of its static value from the stop on; 1 variant has not settled by "
+        "the end of the run."
+    )
+    (time,) = (one for one in summary.in_tables(Results.of(found)) if one.name == "midspan_settling_time")
+    assert time.is_constant and time.partly == "in 1 of 2 variants"
+    screens._ranges([time], [])
+    assert " ".join(capsys.readouterr().out.split()).endswith(
+        "The same where there is one: midspan_settling_time 0 s in 1 of 2 variants."
+    )
+    page = studies.report(found, tmp_path / "page").read_text(encoding="utf-8")
+    assert page.count('<span class="at">in 1 of 2 variants</span>') == 2
+
+
+def told_of(sizes: list[float]) -> str:
+    """What is said of residual vibrations (m) over ever faster accelerations."""
+    steps = {"acceleration": {"of": "carriage.car.motion.acceleration", "values": list(range(2, 2 + len(sizes)))}}
+    found = studies.run(stops(sweep=steps))
+    found["midspan_residual"][:] = sizes
+    (said,) = (text for text in answers.answer(found) if "at rest" in text)
+    return said
+
+
+def test_values_that_go_up_and_down_from_one_to_the_next_are_swept_too_coarsely() -> None:
+    """Towards the end, where they are far apart for how it swings; not for two turns, nor for small ones."""
+    hint = (
+        ". From one acceleration to the next it goes up and down, so peaks between them may be higher: sweep them more "
+        "closely."
+    )
+    assert told_of([1e-6, 2e-6, 6.3e-6, 4.6e-6, 7.4e-6, 4.1e-6, 8.2e-6, 6.7e-6]).endswith(hint)
+    for calm in ([1e-6, 2e-6, 4e-6, 3e-6, 2e-6, 1e-6, 5e-6], [1e-6, 4e-6, 3.8e-6, 4.0e-6, 3.8e-6, 4.1e-6, 3.9e-6]):
+        assert "goes up and down" not in told_of(calm)
+
+
+def test_what_is_left_as_rounding_does_not_swing() -> None:
+    """It is told and drawn without a number."""
+    found = studies.run(stops(sensor={"quarter": {"body": "bed", "at": 0.25}, "midspan": {"body": "bed", "at": 0.5}}))
+    found["quarter_residual"][:] = 1e-10 * float(found["quarter_max"].max())
+    told = [text for text in answers.answer(found) if "at rest" in text]
+    assert "quarter: at rest it does not swing." in told and "midspan: at rest it still swings" in told[0]
+    figure = drawn(found)["residual"]
+    assert len(figure.drawing.axes) == 1 and figure.title.startswith("midspan still swings")

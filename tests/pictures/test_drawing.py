@@ -192,6 +192,16 @@ def test_vehicles_longer_than_their_body_have_no_shapes_of_the_whole() -> None:
     assert [shapes.heading for shapes in page.shapes] == ["Mode shapes of bed", "Mode shapes of cart"]
 
 
+def test_a_deflection_is_said_to_be_of_one_point_where_the_weight_has_several() -> None:
+    wheels = {"rear": {"at": 0.0, "stiffness": 9.0}, "front": {"at": 0.1, "stiffness": 9.0}}
+    body = {"bed": beam(), "cart": {"kind": "rigid", "length": 0.1, "mass": 1.0, "inertia": 1.0}}
+    rides = {"on": "bed", "kind": "body", "body": "cart", "contacts": wheels, "motion": cruise(0.0, 0.9, 1.0)}
+    page = page_of(study(beam(), {"cart": rides, "car": CAR}, body=body, gravity=1.0), ())
+    (table,) = (table for table in page.tables if table.title == "Carriages")
+    sags = [row[table.headings.index("largest static deflection under it")] for row in table.rows]
+    assert [sag.endswith(" of its weight at one point") for sag in sags] == [True, False] and all(sags)
+
+
 def test_what_follows_stands_behind() -> None:
     """By its headway, or by its delay times its speed; not where that is far off the body."""
     axles = {"a": CAR, "b": CAR | {"headway": 0.5}, "c": mass(0.1, cruise(1.0, 0.0, 2.0), delay=0.25)}

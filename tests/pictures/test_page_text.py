@@ -3,6 +3,8 @@
 import re
 from pathlib import Path
 
+from results_schema.status import Status
+from studies.reporting import answers
 from studies.reporting.drawing import write_drawing
 from studies.reporting.report import _unbroken, write_report
 from tests.pictures.test_report import archive, check_standing_alone, plain
@@ -45,3 +47,14 @@ def test_on_paper_accuracy_is_printed_and_the_study_file_is_not(tmp_path: Path) 
 def test_lines_do_not_end_within_numbers() -> None:
     """A hyphen would be such a place, a minus sign is none."""
     assert "-" not in _unbroken("0.5 m/s² ± 1.9e-5 m/s²") and "e-x" in _unbroken("pipe-x")
+
+
+def test_keys_in_sentences_are_set_as_code(tmp_path: Path) -> None:
+    """Escaped as the rest of the text, of answers and of the meanings of results."""
+    given = scenes.run("passage", scenes.pace("passage"))
+    given["status"][:] = Status.TOLERANCE_MISSED
+    told = [text for text in answers.answer(given) if "`" in text]
+    page = write_report(archive(tmp_path, given), tmp_path / "out").read_text(encoding="utf-8")
+    body = page.partition("<h2>")[2].partition("<pre>")[0]
+    assert told and "`" not in body and "instants of <code>elapsed</code>" in page
+    assert any(code in body for code in ("<code>solver.tolerance</code>", "<code>tolerance = &#34;told&#34;</code>"))

@@ -14,7 +14,7 @@ from results_schema.arrays import Array
 from studies.findings.absolute_errors import absolute_errors
 from studies.findings.beyond import Limits
 from studies.findings.effects import by_effect
-from studies.findings.residual import MOST_SENSORS, residual_of, ringing, settling_of
+from studies.findings.residual import MOST_SENSORS, quiet, residual_of, ringing, settling_of
 from studies.pictures.common.figures import (
     BLUE,
     Figure,
@@ -27,13 +27,14 @@ from studies.pictures.common.figures import (
 )
 from studies.pictures.common.sizes import FAR
 from studies.pictures.common.sweep_view import View, along_axis, coincide, draw_curves, one_legend, view
-from studies.pictures.common.traces import coarse, picked, since_rest
+from studies.pictures.common.traces import coarse, per_period, picked, since_rest
 from studies.results.findings_common import in_words, told_hanging
-from studies.results.formatting import counted, listed, quantity, scale_for
+from studies.results.formatting import counted, listed, number, quantity, scale_for
 from studies.results.places import Index, extreme
 from studies.results.results import Results
 
 MOST_HISTORIES = 3
+PER_SWING = 8  # stations to a period of what rings: of fewer the farthest may stand an eighth short of it
 BAND = 0.3  # of their colour that bands have together
 
 
@@ -52,7 +53,8 @@ class Row(NamedTuple):
 def pictures(results: Results, limits: Limits) -> list[Figure]:
     """Over the sweep and over time, of sensors that swing on, and how long they take to settle; none where the study
     does not tell it."""
-    told = [sensor for sensor in ringing(results, limits) if np.isfinite(residual_of(results, sensor)).any()]
+    known = (sensor for sensor in ringing(results, limits) if np.isfinite(residual_of(results, sensor)).any())
+    told = [sensor for sensor in known if not quiet(results, sensor)]
     if not told:
         return []
     sensors, values = told[:MOST_SENSORS], residual_of(results, told[0])
@@ -156,17 +158,30 @@ def _draw_row(axes: Axes, seen: View, row: Row) -> None:
 
 def _over_time(results: Results, sensors: list[str], shown: list[Index]) -> Figure:
     """Some variants over the time since the stop, the one that swings most of those with a history last."""
-    seconds, values = since_rest(results, sensors[0], shown[-1])
-    low, high = (quantity(float(end), results.sensors[sensors[0]]) for end in (values.min(), values.max()))
-    moves = f"{sensors[0].replace('_', ' ')} moves between {low} and {high} after the stop"
+    seconds, _ = since_rest(results, sensors[0], shown[-1])
+    size = quantity(float(residual_of(results, sensors[0])[shown[-1]]), results.sensors[sensors[0]])
+    moves = f"{sensors[0].replace('_', ' ')} swings by up to {size} about its static value after the stop"
     caption = (
         "Readings from the moment on at which all carriages have come to rest or left."
         + (" Brightest line: the kept history that swings most." if len(shown) > 1 else "")
         + (f" {hang}" if (hang := told_hanging(results, sensors)) else "")
-        + coarse(results, seconds)
+        + (coarse(results, seconds) or _few(results, sensors, shown))
     )
     title = ",".join(text for text in (moves, in_words(results, shown[-1])) if text)
     return draw("ringing", title, caption, 0.8 + 1.7 * len(sensors), partial(_draw_time, results, sensors, shown))
+
+
+def _few(results: Results, sensors: list[str], shown: list[Index]) -> str:
+    """Which sensors swing faster than stations show, as a sentence behind another; "" where none does."""
+    each = {name: min(per_period(since_rest(results, name, index)[1]) for index in shown) for name in sensors}
+    fast = {name: count for name, count in each.items() if count < PER_SWING}
+    if not fast:
+        return ""
+    names, count = listed([name.replace("_", " ") for name in fast]), number(min(fast.values()), 2)
+    return (
+        f" Stations are too few for {names}, {count} to a period: between them it swings farther than is drawn; "
+        '[output] histories = "all" keeps every step.'
+    )
 
 
 def _draw_time(results: Results, sensors: list[str], shown: list[Index], drawing: Drawing) -> None:

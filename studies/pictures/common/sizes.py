@@ -12,7 +12,7 @@ from matplotlib.figure import Figure as Drawing
 from engine.scene.study import Study
 from engine.scene.trains import axle_name
 from studies.findings.amplification import largest, size_errors, sizes
-from studies.findings.effects import HARDLY
+from studies.findings.effects import HARDLY, hardly_changed
 from studies.findings.in_step import InStep, speeds_in_step
 from studies.pictures.common.figures import FLAT, INK, Figure, draw, limit_far, limit_line, telling_limits
 from studies.pictures.common.sweep_view import UNSEEN, Curve, View, along_axis, draw_curves, one_legend, ratio_above
@@ -146,7 +146,8 @@ def _title(results: Results, sensor: str, limit: float | None, top: Index) -> st
     if limit is not None:
         against = f", {'beyond' if size > limit else 'within'} the limit of {quantity(limit, units)}"
     said = f"The largest {results.noun(sensor)} {results.place(sensor)} is {quantity(size, units)}"
-    return f"{said}{against},{in_words(results, top)}"
+    level = hardly_changed(results, sizes(results, sensor), partial(quantity, units=units))
+    return f"{said}{against}" if level else f"{said}{against},{in_words(results, top)}"
 
 
 def _is_loose(seen: View, sensor: str) -> bool:

@@ -13,6 +13,7 @@ from studies.results.places import Index
 from studies.results.results import Results
 
 PER_PERIOD = 6  # instants: fewer draw another vibration than there is
+LARGE = 0.1  # of the whole range of a reading: swings below say nothing of how fast it swings
 STILL = 1e-9  # of its place: what a carriage at rest is off by rounding
 
 
@@ -80,6 +81,20 @@ def odd_part(out: Way, back: Way) -> Way:
     order = np.argsort(back.position)
     returned = np.interp(out.position, back.position[order], back.values[order])
     return Way(out.position, 0.5 * (out.values - returned))
+
+
+def per_period(values: Array) -> float:
+    """How many instants a period of a reading (T,) has, in the mean of its large swings; infinite without two of them.
+
+    >>> round(per_period(np.cos(2.0 * np.pi * np.arange(60) / 3.5)), 1), per_period(np.arange(9.0))
+    (3.5, inf)
+    """
+    steps = np.diff(values)
+    ends = 1 + np.flatnonzero(steps[1:] * steps[:-1] < 0.0)
+    large = np.abs(np.diff(values[ends])) > LARGE * np.ptp(values)
+    if np.count_nonzero(large) < 2:
+        return np.inf
+    return 2.0 * float(np.diff(ends)[large].mean())
 
 
 def coarse(results: Results, times: Array) -> str:
