@@ -6,7 +6,7 @@ on, finer rungs count as no worse.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -23,13 +23,19 @@ from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts
 
 # What is said of the next three was measured on `asymmetry`, `double-peak` and 10,000 passages: the work they took.
-#: Of the tolerance that a column leaves at such steps, so that none is climbed: 0.5 to 2 took 0.9 to 1.1 times.
+#: Of the tolerance that a column leaves where its modes are judged, so that none is climbed: 0.5 to 2 took 0.9 to 1.1
+#: times.
 HOPELESS = 0.9
 MORE = 2.0  # times the fewest modes that leave little: with 1.4 some variants missed the tolerance, 4 gained nothing
 JUDGED_BY = 12  # modes, at least, of the column that says whether a simpler model can do at all: 6 to 24 took 0.8 to 1
 #: Of the tolerance, by a rung of the last scheme, for all pilots of a scene: dearer ones of other schemes are not
 #: climbed, as none would be taken. Of a gantry's pilots they took three quarters of the time.
 LEAVES = 0.5
+#: Times the steps of a rung, within which a level of a pilot's reference tells enough of it, and fewer pilots than make
+#: its march worth it, which takes as long as that of a whole block of lanes. Ten random sweeps took 0.81 times the time
+#: then, and 0.83 to 1.03 times the own work; as long with 16, at 0.80 to 1.06; whatever their number, one took twice
+#: the own work.
+NEAR, FEW = 2.0, 8
 REFERENCE_PART = 0.25  # of the tolerance by which references may be off, which what they judge is told to be off too
 
 
@@ -80,8 +86,7 @@ class Climb:
         levels = list[Level]()
         aim = refer(levels=as_fixed(self.grid), seen=levels.append)
         truth = aim if is_free(self.grid) else refer(levels=in_full(self.grid))
-        on_ladder = {self.ladder.columns.index(v.numerics): v for v in levels if v.numerics in self.ladder.columns}
-        self.rungs = Rungs(self.grid, self.values, self.ladder, self.span, truth, aim, on_ladder)
+        self.rungs = Rungs(self.grid, self.values, self.ladder, self.span, truth, aim, self._judged(levels))
         shape = len(self.ladder.columns), len(self.ladder.cuts), self.values.size
         self.found = [(np.zeros(1, dtype=np.int64), np.full((1, len(truth.error)), np.inf))]
         self.march = np.zeros(shape, dtype=np.int32)
@@ -95,6 +100,12 @@ class Climb:
         for name, enough in self.enough.items():
             self._fill(name, enough)
         return self._measured(truth, aim is truth)
+
+    def _judged(self, levels: Sequence[Level]) -> dict[int, Level]:
+        """Levels of references that are columns whose modes are judged, by column."""
+        columns = {numerics: column for column, numerics in enumerate(self.ladder.columns)}
+        last = self.ladder.columns[-1].scheme
+        return {columns[v.numerics]: v for v in levels if v.numerics in columns and v.numerics.scheme == last}
 
     def _measured(self, truth: Converged, free: bool) -> Measured:
         """What the jobs found."""
@@ -167,14 +178,24 @@ class Climb:
     def _of_higher_order(self) -> Iterator[Job[list[March]]]:
         """Climbs by that, where the other one does not hold well before; where it does, that is no worse."""
         plain = {swift: column for column, swift in self._pairs().items()}
-        for column in self.floor.keys() - plain.values():
+        for column in (column for column in self.floor if column not in plain.values()):
             start = self.rungs.first(column)
             if column in plain:
                 well = self.held[plain[column]] <= ENOUGH * self.span[0]
                 before = well.any(axis=0) & (np.argmax(well, axis=0) <= start)
                 self._no_worse(column, plain[column], np.flatnonzero(before))
                 start = np.where(before, len(self.ladder.cuts), start)
+            start = np.where(self._near_its_level(column, start), len(self.ladder.cuts), start)
             yield from self._climb(column, start, np.full(start.size, np.inf))
+
+    def _near_its_level(self, column: int, start: Counts) -> NDArray[np.bool_]:
+        """(P,) whether a rung is near to a level of the reference, and too few pilots would march it."""
+        if column not in self.rungs.levels:
+            return np.zeros(start.size, dtype=np.bool_)
+        cuts, worth = np.array([*self.ladder.cuts, np.inf]), self.floor[column] <= HOPELESS * self.span[1]
+        near = self.rungs.known(column) & (cuts[self.rungs.fine(column)] < NEAR * cuts[start])
+        marching = np.bincount(start[worth], minlength=cuts.size)
+        return np.asarray(near & (marching[start] < FEW))
 
     def _further(self) -> Iterator[Job[list[March]]]:
         """The first climbs from where they ended, as far as a scheme of higher order does not hold well for all pilots

@@ -92,8 +92,8 @@ class March(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Rungs:
-    """Marches of pilots on the ladder, measured. truth: the references; aim: those within what the study fixes. span:
-    as of `Climb`."""
+    """Marches of pilots on the ladder, measured. truth: the references; aim: those within what the study fixes;
+    levels: those of their marches that are columns of the ladder, by column. span: as of `Climb`."""
 
     grid: SceneGrid
     values: VariantValues

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.accuracy.climb import LEAVES, Climb, Measured
+from engine.accuracy.climb import FEW, LEAVES, NEAR, Climb, Measured
 from engine.accuracy.grids import AVERAGE_ACCELERATION, FOX_GOODWIN, SceneGrid
 from engine.accuracy.ladder import ENOUGH, ladder_of
 from engine.march.step_rules import least_steps
@@ -219,3 +219,21 @@ def test_levels_of_references_are_rungs_that_need_no_march(fixed: Table) -> None
         for known in climb.rungs.marched(np.flatnonzero(climb.rungs.known(column)), column):
             anew = climb.rungs.march(known.lanes, lambda: False, column, known.rung)
             assert known.error.tobytes() == anew.error.tobytes() and known.held.tobytes() == anew.held.tobytes()
+
+
+def test_few_pilots_do_not_march_what_their_references_nearly_did() -> None:
+    """Of a Fox-Goodwin column whose modes a level had: less than twice as coarse, and by fewer than `FEW` pilots."""
+    grid = only_grid(passages(3, 2, solver={"tolerance": 1e-3}))
+    climb = Climb(grid, grid.values, ladder_of(grid.asked, grid))
+    measured, spared = climb.go(), 0
+    assert grid.values.size < FEW
+    for column in climb.rungs.levels:
+        plain = climb.ladder.columns.index(climb.ladder.columns[column]._replace(scheme=AVERAGE_ACCELERATION))
+        first, level = climb.rungs.first(column), climb.rungs.fine(column)
+        for pilot in np.flatnonzero(climb.rungs.known(column) & (level > first)):
+            coarse, fine = (climb.ladder.cuts[rungs[pilot]] for rungs in (first, level))
+            if fine < NEAR * coarse and np.isfinite(climb.floor[column][pilot]):
+                told = measured.march[column, first[pilot], pilot]
+                assert told in (0, measured.march[plain, first[pilot], pilot])
+                spared += told == 0
+    assert spared > 0
