@@ -115,8 +115,8 @@ def _partly_inert(plan: Plan) -> Iterator[str]:
     """Of the scene without sweep."""
     if sentence := told_of(plan.base, of_loads=True):
         number, force = _braked(plan)
-        name = plan.base.carriages[number].name
-        if number >= 0 and "along" in left_out(plan.study).get(name, ()):
+        name = plan.base.carriages[number].name if number >= 0 else ""
+        if "along" in left_out(plan.study).get(name, ()):
             sentence += f"; the force that brakes {name}, up to {_newtons(force)}, does not push along it either"
         yield sentence
 

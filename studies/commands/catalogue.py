@@ -107,11 +107,9 @@ def start_text(kind: str) -> str:
     if kind in built_in():
         return built_in()[kind].read_text(encoding="utf-8")
     if kind not in KINDS.foreign:
-        what, remedy = (
-            "no such kind of study, or none with a file to start from",
-            _nearest(kind, {name: name for name in known}),
-        )
-        raise BadInput(what, where=kind, expected=f"one of {', '.join([*known, *KINDS.foreign])}", remedy=remedy)
+        what, names = "no such kind of study, or none with a file to start from", [*known, *KINDS.foreign]
+        remedy = _nearest(kind, {name: name for name in known})
+        raise BadInput(what, where=kind, expected=f"one of {', '.join(names)}", remedy=remedy)
     return str(cast(Any, KINDS[kind]).start) + shared
 
 

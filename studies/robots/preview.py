@@ -97,19 +97,14 @@ def foreseen(study: Study, question: Question, threads: int, audited: int) -> Fo
     marched = [one.model.study.body[name].modes for one in found.values() for name in open_bodies(study)]
     most = min(max(map(int, marched), default=MODES[0]), MAX_MODES)  # no study file may fix more
     fuller = study.with_values({f"body.{name}.modes": most for name in open_bodies(study)})
-    less = (
-        _fallen(found)
-        if found
-        else f"{PATIENCE:.0f} seconds were not enough for a variant to converge: this may take longer"
-    )
     table = _taken(cases, {variant: found[variant] for variant in sorted(found)})
-    return Foreseen(
-        fuller, table, float(each * (marches + again)), _bytes(study, cases), _fallen(found) if found else less
-    )
+    return Foreseen(fuller, table, float(each * (marches + again)), _bytes(study, cases), _doubt(found))
 
 
-def _fallen(found: dict[int, Converged]) -> str:
-    """Of variants in which nothing rests, which take no time either; "" where there are none."""
+def _doubt(found: dict[int, Converged]) -> str:
+    """What is said where no variant was done in time, or some fall over, which takes no time; "" otherwise."""
+    if not found:
+        return f"{PATIENCE:.0f} seconds were not enough for a variant to converge: this may take longer"
     fallen = sum(one.status == Status.FALLS_OVER for one in found.values())
     which = f"all {len(found)}" if fallen == len(found) else f"{fallen} of {len(found)}"
     said = f"{which} variants that were tried fall over: a joint is softer than the weight that it has to hold up"
