@@ -19,7 +19,7 @@ from engine.accuracy.ladder import ladder_of
 from engine.accuracy.reference import USUAL_LEVEL, as_fixed, converge, in_full, is_free, level_work
 from engine.accuracy.results import Result, differences, results_of, tolerances, worst_held
 from engine.kernels.layout import STATISTICS
-from engine.march.outcome import number_of, outcome, used, vibration
+from engine.march.outcome import USED, number_of, outcome, used, vibration
 from engine.march.rest import counts_settling
 from engine.model.timeline import MOST_STATIONS
 from engine.observation.histories import CYCLE_STATIONS, WHOLE_STATIONS
@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     from engine.scene.variants import VariantValues
 
 Kept = Literal["numbers", "histories"]
-USED = ("fidelity_used", "scheme_used", "modes_used", "steps_used")  # what a variant is marched again by
 
 PACE = 1.2e9  # modes x steps x variants per second and thread of an ordinary server, for the size of chunks only
 PLACE = 0.2  # of a march that an envelope's place takes besides; likewise

@@ -27,7 +27,7 @@ from engine.accuracy.grids import (
 from engine.accuracy.jobs import InTurn, Job, Share
 from engine.accuracy.results import deciding, differences, results_of, worst_held
 from engine.kernels.schemes import Scheme
-from engine.march.outcome import Flat, Outcome, outcome, used
+from engine.march.outcome import USED, Flat, Outcome, number_of, outcome, used
 from engine.march.step_rules import least_steps
 from engine.model.numerics import Numerics, open_bodies
 from engine.scene.variants import VariantValues
@@ -274,6 +274,22 @@ def _may_march(grid: SceneGrid, values: VariantValues, levels: Levels, level: in
         numerics = levels.numerics[level]
         return np.asarray(least_steps(grid.model(numerics), values) <= grid.unit * numerics.scheme.stride)
     return level_work(grid, values, levels, level) <= MOST_WORK
+
+
+def is_last(grid: SceneGrid, values: VariantValues, levels: Levels, used: Flat) -> NDArray[np.bool_]:
+    """(V,) whether variants were computed (``used``, by the names of the archive) with their last level, beyond which
+    no march is worth its work."""
+    last, more = np.zeros(values.size, dtype=np.int64), np.ones(values.size, dtype=np.bool_)
+    for level in range(1, len(levels.numerics)):
+        more &= _may_march(grid, values, levels, level)
+        last[more] = level
+    found = np.zeros(values.size, dtype=np.bool_)
+    for level in np.unique(last):
+        model = grid.model(levels.numerics[level])
+        steps = grid.unit * model.scheme.stride * _by(grid, values, levels, level)
+        taken = int(model.fidelity), int(number_of(model.scheme)), model.body_modes, steps
+        found |= (last == level) & np.all([used[name] == own for name, own in zip(USED, taken, strict=True)], axis=0)
+    return found
 
 
 def usual_work(grid: SceneGrid, values: VariantValues, dear: float) -> Array:

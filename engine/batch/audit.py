@@ -14,13 +14,14 @@ import numpy as np
 from engine.accuracy.choice import usual_pilots
 from engine.accuracy.climb import REFERENCE_PART
 from engine.accuracy.grids import SceneGrid
-from engine.accuracy.groups import PACE, USED
+from engine.accuracy.groups import PACE
 from engine.accuracy.jobs import Crashed, Halted, Job, Share, over_scenes
-from engine.accuracy.reference import DEAR, IN_TURN, Beyond, Converged, converge, in_full, passages, usual_work
+from engine.accuracy.reference import DEAR, IN_TURN, Beyond, Converged, converge, in_full, is_last, passages, usual_work
 from engine.accuracy.results import differences, results_of
 from engine.batch.chunk import told_errors
 from engine.batch.plan import Plan
 from engine.kernels.layout import LANES
+from engine.march.outcome import USED, Flat
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts, Mask
 from results_schema.statuses import lost
@@ -120,6 +121,17 @@ def _works(grid: SceneGrid, dear: float) -> tuple[Array, Counts]:
     works, numbers = (np.concatenate(column) for column in zip(*found, strict=True))
     work, place = np.unique(works, return_inverse=True)
     return work, np.bincount(place, numbers).astype(np.int64)
+
+
+def may_go_further(plan: Plan, variants: Counts, used: Flat) -> Mask:
+    """Which of some variants were computed (``used``, by the names of the archive) with less than audits have at most;
+    of the others a march would be no second source."""
+    found = np.ones(variants.size, dtype=np.bool_)
+    for grid, members in zip(plan.grids, plan.members, strict=True):
+        own = np.flatnonzero(_among(variants, members, plan.size))
+        values = VariantValues.of(grid.scene.study, plan.cases, variants[own])
+        found[own] = ~is_last(grid, values, in_full(grid), {name: used[name][own] for name in USED})
+    return found
 
 
 def audit(plan: Plan, variants: Counts, share: Share = IN_TURN) -> Audit:

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.accuracy.grids import SceneGrid
-from engine.accuracy.groups import USED, Found, Group, marches_again
+from engine.accuracy.groups import Found, Group, marches_again
 from engine.accuracy.jobs import Halted, Job, Share
 from engine.accuracy.results import Result, results_of, worst_held
 from engine.batch.plan import NOBODY, Plan
 from engine.linear_algebra import one_thread
-from engine.march.outcome import Flat, histories
+from engine.march.outcome import USED, Flat, histories
 from engine.observation.histories import counts_at_rest, counts_shown
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts

@@ -123,6 +123,9 @@ def outcome(
     return Outcome(numbers, history, status, diverged_step, _scale(tables, values, numbers))
 
 
+USED = ("fidelity_used", "scheme_used", "modes_used", "steps_used")  # what a variant is marched again by
+
+
 def used(tables: SceneTables, size: int) -> Flat:
     """What so many variants were computed with, by the names of the archive."""
     marched = 0 if _rests(tables) else tables.steps

@@ -44,12 +44,15 @@ def audit_group(plan: Plan, dataset: xr.Dataset, work: Work) -> dict[str, xr.Dat
 
     dataset: the study's own. Raises Interrupted.
     """
-    from engine.batch.audit import sampled
+    from engine.batch.audit import may_go_further, sampled
     from engine.batch.execution import choose
+    from engine.march.outcome import USED
 
     choose(plan, work.place, work.stop.event)
     variants = sampled(plan)
     kept = ~lost(_flat(plan.cases, dataset["status"])[variants])
+    if plan.study.output.keeps_variants:
+        kept &= may_go_further(plan, variants, {name: _flat(plan.cases, dataset[name])[variants] for name in USED})
     found = _shared_out(plan, variants[kept], work)
     work.check()
     if not found.variants.size:

@@ -31,7 +31,7 @@ def unreduced_group(plan: Plan, dataset: xr.Dataset, check: Callable[[], None] =
 
     dataset: the study's own. check: called now and then, to stop by what it raises.
     """
-    from engine.accuracy.groups import USED
+    from engine.march.outcome import USED
     from engine.unreduced.comparison import compare_variant
 
     variants = _chosen(plan, dataset)

@@ -10,7 +10,7 @@ import pytest
 from engine.accuracy.reference import usual_work
 from engine.accuracy.results import results_of
 from engine.batch import audit as module
-from engine.batch.audit import audit, audit_size, joined, sampled
+from engine.batch.audit import audit, audit_size, joined, may_go_further, sampled
 from engine.batch.plan import Plan, make_plan
 from tests.accuracy.chosen import STUDIES, chosen_plan, run_of
 from tests.accuracy.passages import WEIGHT, axis, passages
@@ -110,6 +110,18 @@ def test_variants_without_a_truth_are_left_out() -> None:
     plan = make_plan(study(beam(modes=3), car, sweep=sweep, solver={"steps": 200, "tolerance": 0.1}))
     found = on(plan, [0, 1])
     assert found.variants.tolist() == [0] and found.left_out == 1
+
+
+def test_what_nothing_finer_is_left_of_is_known_without_a_march() -> None:
+    """The same are left out by an audit that marches them."""
+    asked = {"of": "solver.tolerance", "values": [1e-2, 1e-9, 1e-4]}
+    plan = make_plan(passages(sweep={"asked": asked}, solver={"tolerance": 1e-2}))
+    (group,) = plan.groups
+    everyone = np.arange(3)
+    used = group.found(plan.values(group, everyone), everyone, None, lambda: False).used
+    further = may_go_further(plan, everyone, used)
+    assert further.tolist() == [True, False, True]
+    assert on(plan, everyone).variants.tolist() == np.flatnonzero(further).tolist()
 
 
 def test_no_variants_are_an_audit_too() -> None:
