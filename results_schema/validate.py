@@ -9,8 +9,8 @@ import numpy as np
 
 from results_schema.blocks import slices
 from results_schema.errors import ArchiveError
+from results_schema.gravest_status import lost
 from results_schema.lazy_imports import xr
-from results_schema.statuses import lost
 from results_schema.variables import Variable, axes, expand
 
 _TEXT_KINDS = "UTO"

@@ -24,8 +24,8 @@ from engine.march.rest import counts_settling
 from engine.model.timeline import MOST_STATIONS
 from engine.observation.histories import CYCLE_STATIONS, WHOLE_STATIONS
 from results_schema.arrays import Array, Counts, split
+from results_schema.gravest_status import lost
 from results_schema.status import Fidelity
-from results_schema.statuses import lost
 
 if TYPE_CHECKING:
     from engine.accuracy.choice import Choice

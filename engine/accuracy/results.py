@@ -17,8 +17,8 @@ from engine.model.lane_table import weights
 from engine.observation.contact_forces import contacts_that_react
 from engine.observation.cycle_reduction import HISTORY_PART, Compared
 from results_schema.arrays import Array
+from results_schema.gravest_status import lost
 from results_schema.quantities import QUANTITIES
-from results_schema.statuses import lost
 
 if TYPE_CHECKING:
     from engine.march.outcome import Asked, Outcome

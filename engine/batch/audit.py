@@ -24,7 +24,7 @@ from engine.kernels.layout import LANES
 from engine.march.outcome import USED, Flat
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts, Mask
-from results_schema.statuses import lost
+from results_schema.gravest_status import lost
 
 SEED = 7717  # of the variants that are drawn; pilots have another
 PART, FEWEST, MOST = 0.01, 16, 256  # of all variants, where their number is left open: 256 show a miss in a hundred

@@ -20,8 +20,8 @@ from engine.observation.histories import counts_at_rest, counts_shown
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts
 from results_schema.errors import WorkersGaveUp
+from results_schema.gravest_status import gravest, lost
 from results_schema.status import Status
-from results_schema.statuses import gravest, lost
 from results_schema.store.rows import Arrays, Chunk, Rows, joined
 
 OF_CRASHED = {"status": np.int8(Status.CRASHED), "diverged_step": np.int64(-1)}  # other whole numbers are 0

@@ -18,8 +18,8 @@ from engine.kernels.floating.layout import Weights
 from engine.kernels.schemes import SCHEMES, AlphaScheme, NewmarkScheme
 from engine.march.stepper import Halted
 from results_schema.arrays import Array, Counts
+from results_schema.gravest_status import gravest, lost
 from results_schema.status import Fidelity, Status
-from results_schema.statuses import gravest, lost
 
 if TYPE_CHECKING:
     from engine.floating.model import FloatingModel

@@ -15,8 +15,8 @@ from engine.kernels.floating.march import march as march_lanes
 from engine.kernels.floating.observe import CONTACT_FORCE, OF_CARRIAGE
 from engine.kernels.layout import LANES
 from results_schema.arrays import Array, Counts
+from results_schema.gravest_status import gravest
 from results_schema.status import Fidelity, Status
-from results_schema.statuses import gravest
 
 if TYPE_CHECKING:
     from engine.floating.model import FloatingModel

@@ -12,9 +12,9 @@ from engine.floating.theory import bent_times, unstiffened_times
 from engine.kernels.floating.layout import LARGEST, LARGEST_AT, SMALLEST, SMALLEST_AT, SQUARES
 from engine.kernels.floating.observe import OF_BODY, OF_CARRIAGE, OF_POINT
 from results_schema.arrays import Array, Counts
+from results_schema.gravest_status import gravest, lost
 from results_schema.quantities import AFTER_STOP, QUANTITIES
 from results_schema.status import Status
-from results_schema.statuses import gravest, lost
 
 if TYPE_CHECKING:
     from engine.floating.march import Marched

@@ -25,8 +25,8 @@ from engine.observation.cycle_reduction import Cycle, Reduction
 from engine.observation.histories import counts_reduced
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts
+from results_schema.gravest_status import lost
 from results_schema.status import Fidelity, SchemeUsed, Status
-from results_schema.statuses import lost
 
 if TYPE_CHECKING:
     from engine.scene.study import Study

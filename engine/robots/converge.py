@@ -28,8 +28,8 @@ from engine.robots.modes import (
 from engine.robots.results import are_held, differences, outcome, results_of, times_apart, without_values
 from results_schema.arrays import Array, Mask
 from results_schema.errors import BadInput
+from results_schema.gravest_status import gravest
 from results_schema.status import Status
-from results_schema.statuses import gravest
 
 if TYPE_CHECKING:
     from engine.kernels.robots.layout import Record, Stretch

@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from engine.study_file.checks import NO_JERK, NO_LIMIT, NOT_MEANT, SIZES, is_meant
-from engine.study_file.slips import what_to_write
+from engine.study_file.syntax_remedies import what_to_write
 from results_schema.errors import BadInput, printable, shortened
 
 #: Of a study's text, 160,000 samples of three numbers: 1.2 MB of such take 0.3 s to read, 20 MB 5 s, and 20 MB of what

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from engine.scene.study import CELLS
 from engine.scene.sweep import VARIANT, cells_of
 from results_schema.arrays import Array, Counts
+from results_schema.gravest_status import gravest
 from results_schema.lazy_imports import xr
 from results_schema.status import Status, label
-from results_schema.statuses import gravest
 from results_schema.store.rows import Chunk, Rows, joined
 from results_schema.variables import axes
 from studies.protocol.kept_pilots import NAME as PILOTS

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from engine.accuracy.jobs import Crashed, Job
 from engine.march.stepper import Halted
 from results_schema.arrays import Array, Counts
+from results_schema.gravest_status import lost
 from results_schema.lazy_imports import xr
 from results_schema.status import Fidelity, Status
-from results_schema.statuses import lost
 from results_schema.variables import axes, declarations
 from studies.at_rest.errors import told_errors
 from studies.findings.amplification import derived_from

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from results_schema.arrays import Array
+from results_schema.gravest_status import lost
 from results_schema.lazy_imports import xr
-from results_schema.statuses import lost
 from results_schema.variables import axes, declarations, sensor_unit
 from studies.results.formatting import counted, listed, percent
 from studies.results.places import spread

@@ -17,8 +17,8 @@ from engine.batch.plan import Plan
 from engine.scene.study import Study
 from results_schema.arrays import Counts
 from results_schema.errors import BadInput
+from results_schema.gravest_status import lost
 from results_schema.status import Status
-from results_schema.statuses import lost
 from results_schema.store import rows
 from results_schema.store.archive import open_archive
 from studies.commands.cli import main as command

@@ -6,8 +6,8 @@ import pytest
 
 from results_schema import variables
 from results_schema.errors import ArchiveError, BadInput
+from results_schema.gravest_status import gravest, lost
 from results_schema.status import GRAVEST, Fidelity, Status, flag_meanings, flag_values, label
-from results_schema.statuses import gravest, lost
 from results_schema.validate import findings_of, validate
 from results_schema.variables import RESERVED, Variable, axes, declarations, declare, expand, registered, sensor_unit
 from studies.protocol.study import KINDS
