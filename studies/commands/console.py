@@ -88,8 +88,8 @@ def table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]], ta
     console = _output()
     numeric = [all(_NUMBER.fullmatch(cell) for cell in column) for column in zip(*cells, strict=True)]
     widths = _widths([headings, *cells], console.width, numeric)
-    if title:
-        console.print(Text(printable(title, LONGEST_CELL), "bold"), soft_wrap=True)
+    for line in _wrapped(printable(title, LONGEST_CELL), console.width) if title else []:
+        console.print(Text(line, "bold"), soft_wrap=True)
     lines = [[_wrapped(cell, width) for cell, width in zip(row, widths, strict=False)] for row in cells]
     if not widths or max((len(cell) for row in lines for cell in row), default=0) > tallest:
         _blocks(console, headings, cells)

@@ -41,9 +41,9 @@ def show_preview(shown: Preview) -> None:
         paragraphs("Is this meant?", *(f"- {remark}" for remark in doubts), "")
     for part in shown.tables:
         table(part.title, part.headings, part.rows)
-    say(shown.cost)
+    paragraphs(shown.cost)
     if others:
-        say("", "Worth knowing", *(f"- {remark}" for remark in others))
+        paragraphs("", "Worth knowing", *(f"- {remark}" for remark in others))
 
 
 def warn_of(remarks: Sequence[str]) -> None:

@@ -46,9 +46,10 @@ def test_screens_fit_80_columns_and_speak_the_units_of_the_file(here: Path, caps
     write(here, typed)
     shown = output(capsys, "run", "small.toml", "-v")
     assert "36 km/h" in shown and "m/s" not in shown
-    screens = [shown, *(output(capsys, *command) for command in (["info", "small.nc"], ["list"]))]
+    checked = output(capsys, "check", "small.toml")
+    screens = [shown, checked, *(output(capsys, *command) for command in (["info", "small.nc"], ["list"]))]
     assert all(len(line) <= 80 for screen in screens for line in screen.splitlines())
-    assert "1.8 to 36 km/h" in output(capsys, "check", "small.toml")
+    assert "1.8 to 36 km/h" in checked
 
 
 WIDE = (
