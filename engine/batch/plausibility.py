@@ -11,6 +11,7 @@ from engine.batch.plan import Plan
 from engine.batch.unreached import unreached
 from engine.bodies.modal.modal_body import ModalBody
 from engine.model.lane_table import moving_mass, weight
+from engine.observation.signals import build_sensors
 from engine.scene.study import Study
 from engine.scene.sweep import broken
 from engine.scene.variants import SpringKeys
@@ -79,6 +80,15 @@ def _silent(plan: Plan) -> Iterator[str]:
                 f"{key.replace('.', ' ')} reads 0 in some variants: the first frequency of {body}, up to "
                 f"{first.max():.4g} Hz, is above its frequency_limit there"
             )
+
+
+def _at_rest(plan: Plan) -> Iterator[str]:
+    """Of the scene without sweep; frequency limits are told of elsewhere."""
+    limited = _limits(plan)
+    for sensor in build_sensors(plan.base):
+        if sensor.silent(plan.base) and f"sensor.{sensor.name}" not in limited:
+            reads = sensor.quantity.replace("_", " ")
+            yield f"sensor {sensor.name} reads 0: its body has no {reads} there, as at a support or a free end"
 
 
 def _between_places(plan: Plan) -> Iterator[str]:
@@ -377,6 +387,7 @@ REMARKS = (
     _light,
     _slow,
     _silent,
+    _at_rest,
     _between_places,
     _deep,
     _thin,

@@ -104,6 +104,7 @@ def outcome(
     counts = np.unique(np.concatenate([own, stations, *watched]))
     lanes, size = in_whole_blocks(values), values.size
     marched = march_scheme(tables, lanes, counts, size, halted, len(tables.signals) if stations.size else None)
+    _silence(tables, marched)
     history = marched.history[np.searchsorted(counts, stations)]
     reduction = marched.history[np.searchsorted(counts, own), : len(asked.study.sensor)]
     numbers = {
@@ -147,6 +148,21 @@ def number_of(scheme: Scheme) -> SchemeUsed:
 def _rests(tables: SceneTables) -> bool:
     """Whether nothing is marched."""
     return tables.model.fidelity is Fidelity.STATIC
+
+
+def _silent(tables: SceneTables) -> list[int]:
+    """Numbers of the sensors that read nothing but rounding."""
+    own = tables.sensors[: len(tables.model.study.sensor)]
+    return [j for j, sensor in enumerate(own) if sensor.silent(tables.model)]
+
+
+def _silence(tables: SceneTables, marched: Marched) -> None:
+    """Rounding is nothing: 0."""
+    for j in _silent(tables):
+        marched.history[:, j] = np.where(np.isfinite(marched.history[:, j]), 0.0, marched.history[:, j])
+        for statistics in (part[j] for part in (marched.statistics, marched.resting) if len(part)):
+            for mark in (layout.LARGEST, layout.SMALLEST, layout.SQUARES):
+                statistics[mark] = np.where(np.isfinite(statistics[mark]), 0.0, statistics[mark])
 
 
 def _extremes(tables: SceneTables, marched: Marched, counts: Counts) -> Flat:
@@ -264,13 +280,13 @@ def _statics(tables: SceneTables, values: VariantValues) -> Flat:
     that is rounding."""
     unit = tables.statics.over_window
     loads, gravity, least = weights(tables.model, values), values.gravity, _least_static(tables, values)
-    found: Flat = {}
+    found, silent = Flat(), _silent(tables)
     for j, sensor in enumerate(tables.sensors[: len(tables.model.study.sensor)]):
         if loads.shape[0] == 1 and not np.any(unit.gravity[:, j]):
             static = np.abs(unit.force[:, j, 0]).max() * np.abs(loads[0])
         else:
             static = _largest_static(unit.force[:, j], unit.gravity[:, j], loads, gravity)
-        found[f"{sensor.name}_static"] = np.where(static > least[:, j], static, 0.0)
+        found[f"{sensor.name}_static"] = np.where((static > least[:, j]) & (j not in silent), static, 0.0)
     return found
 
 
@@ -305,7 +321,7 @@ def _scale(tables: SceneTables, values: VariantValues, numbers: Flat) -> Array:
             own = np.maximum(least[:, j], np.where(pushed | (static == 0.0), np.maximum(static, own), static))
         columns.append(own)
     found = np.stack(columns, axis=1) if columns else np.zeros((values.size, 0))
-    found[:, [sensor.silent(tables.model) for sensor in tables.sensors[:count]]] = np.inf
+    found[:, _silent(tables)] = np.inf
     return np.where(found > 0.0, found, np.inf)
 
 
@@ -314,6 +330,7 @@ def histories(
 ) -> dict[str, Array]:
     """(V, H) histories of the sensors and of the carriages' ways at stations by their count."""
     marched = march_scheme(tables, in_whole_blocks(values), counts, values.size, halted)
+    _silence(tables, marched)
     time_scale = values.scene_time_scale
     arrays: dict[str, Array] = {"elapsed": elapsed(tables, counts, time_scale)}
     for j, sensor in enumerate(tables.sensors):

@@ -31,7 +31,8 @@ def only_rounding(results: Results, sensor: str) -> bool:
     """Whether a sensor reads nothing, as all of its values are rounding beside those of another one in its unit."""
     alike = [name for name, units in results.sensors.items() if units == results.sensors[sensor]]
     scale = max(float(np.nanmax(sizes(results, name), initial=0.0)) for name in alike)
-    return scale > 0.0 and float(np.nanmax(sizes(results, sensor), initial=0.0)) <= ROUNDING * scale
+    own = sizes(results, sensor)
+    return bool(np.isfinite(own).any()) and float(np.nanmax(own)) <= ROUNDING * scale
 
 
 def size_errors(results: Results, sensor: str) -> Array:

@@ -299,6 +299,9 @@ CASES = {
     "sensor low reads 0 in some variants: the first frequency of bed, up to 1.571 Hz, is above": swept(
         "body.bed.youngs_modulus", [0.25, 1.0], force(3.0, WAY), sensor={"low": LOW}
     ),
+    "sensor end reads 0: its body has no bending moment there, as at a support or a free end": passing(
+        sensor={"end": fixed(1.0, "bending_moment")}
+    ),
     "no place of envelope all is at 0.45 m of bed where bending_moment has a kink": passing(
         ON_THREE, envelope={"all": {"body": "bed", "quantity": "bending_moment", "places": 6}}
     ),

@@ -8,7 +8,7 @@ import pytest
 import studies
 from engine.scene.study import Study
 from tests.bodies.frames import CLAMPED_FREE, LENGTH, straight
-from tests.engine.build import force, shuttle, steel, study, under
+from tests.engine.build import Table, cruise, fixed, force, shuttle, steel, study, under
 
 CANTILEVERS = {
     "beam": steel(LENGTH, supports="clamped-free", damping_ratio=0.02),
@@ -33,3 +33,25 @@ def test_errors_are_told_over_what_is_read_where_nothing_is_read_at_rest(body: s
     assert largest == pytest.approx(90.3, rel=2e-3)
     told = float(found.estimated_error.sel(result="moment_max"))
     assert abs(float(found.moment_max) - largest) <= told * largest and 0.0 < told <= 1e-3
+
+
+SILENT: dict[str, Table] = {
+    "support": fixed(0.0),
+    "end": fixed(LENGTH, "bending_moment"),
+    "rate": fixed(LENGTH, "velocity"),
+}
+
+
+def test_rounding_at_supports_and_ends_is_zero() -> None:
+    """Of it an amplification was told that exceeded limits; beside it what is read elsewhere stays."""
+    passage = study(
+        steel(LENGTH, damping_ratio=0.02), force(300.0, cruise(0.1, LENGTH - 0.1, 5.0)), output={"histories": "all"}
+    )
+    found = studies.run(passage.with_values({"sensor": SILENT | {"middle": fixed(0.5 * LENGTH)}}))
+    for name in SILENT:
+        assert not any(found[f"{name}{end}"].values.any() for end in ("", "_max", "_min", "_rms"))
+        assert np.isnan(found.dynamic_amplification.sel(sensor=name))
+        assert f"{name}: it reads nothing but rounding." in studies.answer(found)
+    alone = studies.run(passage.with_values({"sensor": {"middle": fixed(0.5 * LENGTH)}}))
+    assert float(found.middle_max) == pytest.approx(float(alone.middle_max), rel=1e-3)
+    assert found.dynamic_amplification.sel(sensor="middle") > 1.0
