@@ -215,7 +215,8 @@ def told_accuracy(group: xr.Dataset | None, results: Results) -> str:
     """What was asked, estimated and observed, and what is far from exact as nothing holds it; "" where no estimates
     are."""
     fewer = [] if group is None else [f"{text[0].upper()}{text[1:]}." for text in _fewer(Verdict.of(group), results)]
-    said = (_held_accuracy(group, results), *fewer, told_errors(results), _not_held(results))
+    more = "" if group is None else _beyond_estimates(group)
+    said = (_held_accuracy(group, results), *fewer, told_errors(results), _not_held(results), more)
     return " ".join(text for text in said if text)
 
 
@@ -231,6 +232,21 @@ def _not_held(results: Results) -> str:
             largest = float(np.fmax.reduce(results.estimated_error(str(name))[fine], initial=0.0))
             told += [f"{name} up to {percent(largest)}"] if largest > LARGE else []
     return f"Estimated, but held to no tolerance: {listed(told)}." if told else ""
+
+
+def _beyond_estimates(group: xr.Dataset) -> str:
+    """Beside what is held: what is not, and differs, computed again, by much and by more than was estimated."""
+    ours, names = np.asarray(group["variant_status"].values) == int(Status.OK), group["result"].values
+    own = np.isnan(group["tolerance"].values) & [not str(name).endswith("_position") for name in names]
+    observed, told = (np.asarray(group[f"{name}_error"].values)[ours] for name in ("observed", "estimated"))
+    beyond = np.where(own & (observed > np.maximum(told, LARGE)), observed, 0.0)
+    if not beyond.any() or np.isnan(group["tolerance"].values).all():
+        return ""
+    worst = np.unravel_index(int(np.argmax(beyond)), beyond.shape)
+    others = int(np.count_nonzero(beyond.any(axis=0))) - 1
+    more = f", and {counted(others, 'other result')} by less" if others else ""
+    found, estimated = percent(float(observed[worst])), percent(float(told[worst]))
+    return f"{names[worst[1]]}, which nothing holds, differs by {found} where {estimated} was estimated{more}."
 
 
 def _held_accuracy(group: xr.Dataset | None, results: Results) -> str:

@@ -83,6 +83,24 @@ def test_what_nothing_holds_is_audited_and_told(fine: Outcome) -> None:
     assert Verdict.of(group).held
 
 
+def test_what_is_far_beyond_its_estimate_is_told_beside_what_is_held(fine: Outcome) -> None:
+    """A smallest contact force near a support, say: 47 % where 6 % was estimated, of which nothing was said."""
+    group, results = group_of(fine).copy(deep=True), Results.of(fine.results)
+    (loose, *_) = (str(name) for name in group["result"].values if str(name).endswith("contact_force_min"))
+    at = {"result": loose}
+    group["tolerance"].loc[at], group["observed_error"].loc[at], group["estimated_error"].loc[at] = np.nan, 0.0, 0.05
+    before = told_accuracy(group, results)
+    for observed in (0.04, np.nan):  # within the estimate, or unknown
+        group["observed_error"].loc[at] = observed
+        assert told_accuracy(group, results) == before
+    group["observed_error"].loc[{"result": loose, "sample": group["sample"][0]}] = 0.47
+    told = f"{loose}, which nothing holds, differs by 47 % where 5 % was estimated."
+    assert told_accuracy(group, results) == f"{before} {told}" and Verdict.of(group).held
+    group["estimated_error"].loc[at] = group["observed_error"].loc[at] = 0.01
+    group["observed_error"].loc[at] = 0.015  # hardly seen in a figure
+    assert told_accuracy(group, results) == before
+
+
 def test_plenty_holds(fine: Outcome) -> None:
     verdict = Verdict.of(group_of(fine))
     assert verdict.held and 0.0 < verdict.worst < 1.0 and exit_code(fine) == 0
