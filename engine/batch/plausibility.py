@@ -259,10 +259,7 @@ def _heavy(plan: Plan) -> Iterator[str]:
     ratios = [moving_mass(g.scene, g.values, number).max() / body.mass for g, number, body in _carriages(plan)]
     worst = max(ratios, default=0.0)
     if worst > HEAVY:
-        yield (
-            f"a carriage weighs up to {worst:.3g} times its body: are the units right? If they are, look at more modes "
-            "and steps before believing it"
-        )
+        yield f"a carriage weighs up to {worst:.3g} times its body: are the units right?"
 
 
 def _deep(plan: Plan) -> Iterator[str]:

@@ -180,6 +180,8 @@ def _named_by_pint(name: str) -> tuple[Fraction, Mapping[str, int]]:
     """Exact SI factor and exponents of base units of a name such as "inch"; pint is imported here."""
     from pint import PintError
 
+    if name.casefold() in ("ton", "tons"):  # which pint takes for 907 kg
+        raise fault("a ton is one of several sizes", expected='"t" (1,000 kg) or "kg"', received=shortened(name))
     try:
         quantity = _registry().Quantity(Fraction(1), name).to_base_units()
     except (PintError, TypeError, ValueError, AssertionError):

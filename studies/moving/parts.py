@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from results_schema.arrays import Array, Counts
+from results_schema.errors import BadInput
 from studies.protocol.converged import HISTORY, Told, labelled
 from studies.protocol.parts import Piece, Work, unlabelled
 from studies.results.formatting import percent, quantity
@@ -73,7 +74,9 @@ def pieces(study: Study, duration: Callable[[Mapping[str, Array], int], Array]) 
     found: list[Piece] = []
     for scene in scenes(study, cases):
         longest = float(duration(cases.columns_of(scene.variants), scene.variants.size).max())
-        coarsest = next(iter(levels(scene.study, longest, FIRST_MODES)))
+        coarsest = next(iter(levels(scene.study, longest, FIRST_MODES)), None)
+        if coarsest is None:
+            raise _too_many_steps(scene.study, build(scene.study, FIRST_MODES).first_omega, longest)
         each = coarsest.steps * LEVELS_TAKEN * (STEP_SECONDS + COORDINATE_SECONDS * coarsest.model.size)
         size = int(np.clip(2 * PIECE_SECONDS / each, 1, 4096))
         for first in range(0, scene.variants.size, size):
@@ -82,6 +85,19 @@ def pieces(study: Study, duration: Callable[[Mapping[str, Array], int], Array]) 
             compute = partial(_march, scene, cases, own, duration, longest)
             found.append(Piece(f"variants-{len(found):04d}", words, compute, 0.5 * each * own.size + 0.5))
     return found
+
+
+def _too_many_steps(study: Study, omega: float, longest: float) -> BadInput:
+    """What is refused whose first mode already is too fast for a march."""
+    from engine.floating.converge import MOST_STEPS
+
+    return study.source.fault(
+        "body",
+        "a march of bodies as stiff and light as these would take more steps than any may",
+        expected=f"at most {MOST_STEPS:,} steps",
+        received=f"a first frequency of {omega / (2.0 * np.pi):.3g} Hz over {longest:.4g} s",
+        remedy="look at the units of moduli, second moments, areas and densities",
+    )
 
 
 def _check_steps(study: Study) -> None:
@@ -205,7 +221,7 @@ def _arrays(model: FloatingModel, converged: Converged, kept: Counts, own: Count
     from engine.kernels.floating.observe import BODY_ATTITUDE, BODY_SPIN, BODY_VELOCITY, OF_BODY
     from engine.march.outcome import number_of
 
-    outcome = converged.outcome
+    outcome, error = converged.outcome, converged.error
     found: dict[str, NDArray[Any]] = {
         "number": own,
         **outcome.numbers,
@@ -214,7 +230,8 @@ def _arrays(model: FloatingModel, converged: Converged, kept: Counts, own: Count
         "steps_used": converged.steps,
         "fidelity_used": np.full(own.size, int(converged.fidelity), dtype=np.int8),
         "scheme_used": np.full(own.size, int(number_of(converged.scheme)), dtype=np.int8),
-        "estimated_error": np.ascontiguousarray(converged.error.T, dtype=np.float32),
+        # where a finer march gives up no estimate exists
+        "estimated_error": np.ascontiguousarray(np.where(np.isinf(error), np.nan, error).T, dtype=np.float32),
     }
     history, times = outcome.history[kept], outcome.times[kept]
     for name in model.places:

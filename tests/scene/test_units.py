@@ -103,6 +103,7 @@ def test_values_are_rounded_once(unit: Any, text: str, value: float) -> None:
         (Length, "1 m*__import__('os')", ["no such unit"]),
         (Length, "1 " + "m*" * 60 + "m", ["not a length"]),
         (Mass, "20 degC", ["not a mechanical unit"]),
+        (Mass, "10 tons", ["several sizes", "1,000 kg"]),
         (Dimensionless, "3 dB", ["no such unit"]),
     ],
 )

@@ -1,0 +1,53 @@
+"""Bodies in frames that move which marches can hardly follow."""
+
+import numpy as np
+import pytest
+
+import studies
+from engine.scene.study import load
+from results_schema.errors import BadInput
+
+BEAD = """
+schema_version = 1
+kind = "moving-frames"
+gravity = 9.81
+[body.beam]
+kind = "beam"
+length = "3 m"
+area = 1e-3
+second_moment = 1e-7
+youngs_modulus = "210 GPa"
+density = 7850.0
+supports = "clamped-free"
+damping_ratio = 0.02
+modes = 8
+own_weight = true
+[frame.beam]
+turned = [0, "-20 deg", 0]
+[carriage.bead]
+on = "beam"
+kind = "mass"
+mass = "1 kg"
+motion = { kind = "free", start = "0.2 m", coulomb = 0.0 }
+[sensor.mid]
+body = "beam"
+at = "1.5 m"
+[question]
+duration = "1.2 s"
+"""
+
+
+def test_bodies_too_stiff_for_any_march_are_refused() -> None:
+    """A second moment in mm4 typed as m4: it was a bug of our own."""
+    given = load(BEAD).with_values({"body.beam.second_moment": 218700.0})
+    with pytest.raises(
+        BadInput, match=r"more steps than any may.*first frequency of .* Hz over 1.2 s.*look at the units"
+    ):
+        studies.run(given)
+
+
+def test_where_finer_models_give_up_no_estimate_exists() -> None:
+    """Of eight modes that are fixed, beside more of them: infinite errors ended the run, and its results were lost."""
+    found = studies.run(load(BEAD))
+    assert not np.isinf(found["estimated_error"]).any() and not np.isinf(found["error_estimate"])
+    assert float(found["bead_contact_force_max"]) == pytest.approx(14.93, rel=2e-3)
