@@ -174,18 +174,12 @@ def _checksum_only(variable: Any) -> _Loaded:
     return _outline(variable)[0], checksum(variable)
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True)
 class _Left:
-    """Leaves large arrays of a checked file where they are. The file stays open from the first of them that is read
-    until none is there any more: to open it takes longer than most of them."""
+    """Leaves large arrays of a file where they are."""
 
     path: Path
     state: tuple[int, ...]
-    _file: Any = None
-
-    def __deepcopy__(self, memo: object) -> _Left:
-        """Itself, as nothing changes what it reads."""
-        return self
 
     def __call__(self, variable: Any) -> _Loaded:
         """The array, or what reads it when it is asked for, with the checksum of what is there now."""
@@ -199,14 +193,10 @@ class _Left:
 
     def _part(self, place: str, rows: slice, at: tuple[int | slice, ...]) -> np.ndarray:
         """Some of an array. Raises ArchiveError where it is not the file that was checked any more."""
-        import netCDF4
-
-        with files.NETCDF_LOCK, _as_archive_error(self.path):
-            if self._file is None:
-                self._file = netCDF4.Dataset(self.path, "r")
+        with opened(self.path) as dataset:
             if _state(self.path) != self.state:
                 raise ArchiveError("has changed while it was read", where=str(self.path), remedy="try again")
-            variable = self._file[place]
+            variable = dataset[place]
             _set_up(variable)
             return np.asarray(variable[(rows, *at)])
 
