@@ -33,8 +33,8 @@ JUDGED_BY = 12  # modes, at least, of the column that says whether a simpler mod
 LEAVES = 0.5
 #: Times the steps of a rung, within which a level of a pilot's reference tells enough of it, and fewer pilots than make
 #: its march worth it, which takes as long as that of a whole block of lanes. Ten random sweeps took 0.81 times the time
-#: then, and 0.83 to 1.03 times the own work; as long with 16, at 0.80 to 1.06; whatever their number, one took twice
-#: the own work.
+#: then, and 0.83 to 1.03 times the own work; as long with 16, at 0.80 to 1.06; whatever their number, two took 1.7 and
+#: 2.3 times the own work.
 NEAR, FEW = 2.0, 8
 REFERENCE_PART = 0.25  # of the tolerance by which references may be off, which what they judge is told to be off too
 

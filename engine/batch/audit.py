@@ -124,8 +124,8 @@ def _works(grid: SceneGrid, dear: float) -> tuple[Array, Counts]:
 
 
 def may_go_further(plan: Plan, variants: Counts, used: Flat) -> Mask:
-    """Which of some variants were computed (``used``, by the names of the archive) with less than audits have at most;
-    of the others a march would be no second source."""
+    """Which of some variants were computed (``used``, by the names of the archive) with less than audits have at most:
+    of the others no march is finer."""
     found = np.ones(variants.size, dtype=np.bool_)
     for grid, members in zip(plan.grids, plan.members, strict=True):
         own = np.flatnonzero(_among(variants, members, plan.size))

@@ -82,7 +82,7 @@ def _silent(plan: Plan) -> Iterator[str]:
             )
 
 
-def _at_rest(plan: Plan) -> Iterator[str]:
+def _reads_nothing(plan: Plan) -> Iterator[str]:
     """Of the scene without sweep; frequency limits are told of elsewhere."""
     limited = _limits(plan)
     for sensor in build_sensors(plan.base):
@@ -384,7 +384,7 @@ REMARKS = (
     _light,
     _slow,
     _silent,
-    _at_rest,
+    _reads_nothing,
     _between_places,
     _deep,
     _thin,

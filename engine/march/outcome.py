@@ -150,15 +150,9 @@ def _rests(tables: SceneTables) -> bool:
     return tables.model.fidelity is Fidelity.STATIC
 
 
-def _silent(tables: SceneTables) -> list[int]:
-    """Numbers of the sensors that read nothing but rounding."""
-    own = tables.sensors[: len(tables.model.study.sensor)]
-    return [j for j, sensor in enumerate(own) if sensor.silent(tables.model)]
-
-
 def _silence(tables: SceneTables, marched: Marched) -> None:
-    """Rounding is nothing: 0."""
-    for j in _silent(tables):
+    """Let sensors that read nothing but rounding read 0."""
+    for j in tables.silent:
         marched.history[:, j] = np.where(np.isfinite(marched.history[:, j]), 0.0, marched.history[:, j])
         for statistics in (part[j] for part in (marched.statistics, marched.resting) if len(part)):
             for mark in (layout.LARGEST, layout.SMALLEST, layout.SQUARES):
@@ -280,13 +274,13 @@ def _statics(tables: SceneTables, values: VariantValues) -> Flat:
     that is rounding."""
     unit = tables.statics.over_window
     loads, gravity, least = weights(tables.model, values), values.gravity, _least_static(tables, values)
-    found, silent = Flat(), _silent(tables)
+    found: Flat = {}
     for j, sensor in enumerate(tables.sensors[: len(tables.model.study.sensor)]):
         if loads.shape[0] == 1 and not np.any(unit.gravity[:, j]):
             static = np.abs(unit.force[:, j, 0]).max() * np.abs(loads[0])
         else:
             static = _largest_static(unit.force[:, j], unit.gravity[:, j], loads, gravity)
-        found[f"{sensor.name}_static"] = np.where((static > least[:, j]) & (j not in silent), static, 0.0)
+        found[f"{sensor.name}_static"] = np.where((static > least[:, j]) & (j not in tables.silent), static, 0.0)
     return found
 
 
@@ -321,7 +315,7 @@ def _scale(tables: SceneTables, values: VariantValues, numbers: Flat) -> Array:
             own = np.maximum(least[:, j], np.where(pushed | (static == 0.0), np.maximum(static, own), static))
         columns.append(own)
     found = np.stack(columns, axis=1) if columns else np.zeros((values.size, 0))
-    found[:, _silent(tables)] = np.inf
+    found[:, tables.silent] = np.inf
     return np.where(found > 0.0, found, np.inf)
 
 

@@ -200,6 +200,12 @@ class SceneTables:
         return Statics(self.model, self.timeline, self.sensors)
 
     @cached_property
+    def silent(self) -> list[int]:
+        """Numbers of the study's sensors that read nothing but rounding."""
+        own = self.sensors[: len(self.model.study.sensor)]
+        return [j for j, sensor in enumerate(own) if sensor.silent(self.model)]
+
+    @cached_property
     def static_scales(self) -> Array:
         """(sensors,) a sensor's largest static reading per unit force anywhere on its body; of a rate that of the
         displacement times powers of the highest frequency kept."""

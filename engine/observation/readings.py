@@ -125,8 +125,8 @@ class Sensor:
         return _spread(model, model.bodies[self.body], self._rows(model, along))
 
     def silent(self, model: SceneModel) -> bool:
-        """Whether no mode of its body says anything there, such as the deflection at a support: what it reads is
-        rounding, and has no relative error."""
+        """Whether no mode of its body says anything there, nor what it reads at rest, such as the deflection at a
+        support: what it reads is rounding, and has no relative error."""
         if self.under is not None:
             return False
         modal = self._modal(model)
@@ -137,7 +137,21 @@ class Sensor:
             rows = modal.shape(places, self.reads.derivative)
         rows[0] = rows[0] * self._counts(model)
         here, *elsewhere = np.abs(rows).max(axis=1)
-        return bool(here <= SILENT * max(elsewhere))
+        return bool(here <= SILENT * max(elsewhere)) and (self.offset_order > 0 or self._still(model))
+
+    def _still(self, model: SceneModel) -> bool:
+        """Whether neither what pushes its body nor its own weight says anything there at rest, beside other places."""
+        anywhere, places = replace(self, under=0), np.linspace(0.0, self._modal(model).length, PLACES)
+        one, pairs = _at_rest(places), (np.repeat(places, places.size), np.tile(places, places.size))
+        acting = (attachment.unit for ties in model.attachments for attachment in ties if attachment.body == self.body)
+        for push in {unit if unit.rider is None else replace(unit, rider=1) for unit in acting}:
+            here = self.unit_reading(model, (one, one), push)
+            there = anywhere.unit_reading(model, tuple(map(_at_rest, pairs)), push)
+            if np.abs(here).max() > SILENT * np.abs(there).max():
+                return False
+        weights = (reader.offset(model, (one,)) for reader in (self, anywhere))
+        here, there = (np.abs(weight).max() for weight in weights)
+        return bool(here <= SILENT * there)
 
     def largest_influence(self, model: SceneModel, places: Array) -> float:
         """Its largest static reading per unit force at places of its body's track; of a rate, of the displacement.
@@ -266,11 +280,13 @@ class SpotSensor(Sensor):
         return np.full(along[0].s.size, self._gauge(model).own_weight() if weighs else 0.0)
 
     def silent(self, model: SceneModel) -> bool:
-        """Whether no load on the track moves it, nor its body as a rigid one."""
+        """Whether neither a load on the track nor own weight moves it, nor its body as a rigid one."""
         modal = self._modal(model)
         places = np.linspace(0.0, modal.length, PLACES)
         usual = 1.0 if self.reads.of_support else np.abs(modal.influence_at(places, places)).max()
-        return bool(not modal.rigid_modes and self.largest_influence(model, places) <= SILENT * usual)
+        hangs = abs(self._gauge(model).own_weight()) if model.bodies[self.body].own_weight else 0.0
+        moved = max(self.largest_influence(model, places), hangs / modal.mass)
+        return bool(not modal.rigid_modes and moved <= SILENT * usual)
 
     def largest_influence(self, model: SceneModel, places: Array) -> float:
         gauge = self._gauge(model)

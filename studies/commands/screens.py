@@ -16,7 +16,7 @@ from studies.results.cells import percentile_spans
 from studies.results.findings_common import missed_most, remedy
 from studies.results.formatting import counted, listed, number, quantity, spanned
 from studies.results.results import Results
-from studies.runs.audit import told_accuracy, told_audit
+from studies.runs.audit_findings import told_accuracy, told_audit
 
 if TYPE_CHECKING:
     from results_schema.store.archive import Summary

@@ -35,7 +35,7 @@ from studies.results.formatting import counted, number, unit_text
 from studies.results.results import Results
 from studies.runs import audit
 from studies.runs.archived import results_of
-from studies.runs.audit import told_accuracy, told_audit
+from studies.runs.audit_findings import told_accuracy, told_audit
 from studies.runs.datasets import archive_of
 from studies.runs.unreduced import GROUP, told_unreduced
 

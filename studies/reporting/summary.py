@@ -21,8 +21,8 @@ from studies.results.axes import VARIANT
 from studies.results.cells import End, cell_ranges, counts_of, single_numbers, words_of
 from studies.results.formatting import ALIKE, NOISE, counted, quantity
 from studies.results.results import Results
-from studies.runs.audit import Verdict
-from studies.runs.audit import as_json as audit_as_json
+from studies.runs.audit_findings import Verdict
+from studies.runs.audit_findings import as_json as audit_as_json
 
 if TYPE_CHECKING:
     from studies.results.results import Results

@@ -18,7 +18,7 @@ from studies.reporting import answers
 from studies.reporting.summary import ranges
 from studies.results.formatting import scientific
 from studies.results.results import Results
-from studies.runs.audit import told_accuracy
+from studies.runs.audit_findings import told_accuracy
 from tests.bodies.frames import body
 from tests.engine.build import steel
 from tests.studies import at_rest as small

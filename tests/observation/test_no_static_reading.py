@@ -5,7 +5,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+import engine
 import studies
+from engine.batch.plan import make_plan
+from engine.batch.plausibility import remarks
 from engine.scene.study import Study
 from tests.bodies.frames import CLAMPED_FREE, LENGTH, straight
 from tests.engine.build import Table, cruise, fixed, force, shuttle, steel, study, under
@@ -55,3 +58,17 @@ def test_rounding_at_supports_and_ends_is_zero() -> None:
     alone = studies.run(passage.with_values({"sensor": {"middle": fixed(0.5 * LENGTH)}}))
     assert float(found.middle_max) == pytest.approx(float(alone.middle_max), rel=1e-3)
     assert found.dynamic_amplification.sel(sensor="middle") > 1.0
+
+
+@pytest.mark.parametrize("modes", [2, 6])
+def test_what_no_kept_mode_says_but_what_pushes_does_is_no_rounding(modes: int) -> None:
+    """The axial force by which 50 kg are braked with 2 m/s2, on modes that bend alone: its error was told to be 0."""
+    rail = straight({"a": ["x", "z"], "b": ["z"]}, plane="xz", damping_ratio=0.02, modes=modes)
+    motion = {"kind": "point-to-point", "start": 2.0, "end": 12.0, "speed": 2.0, "acceleration": 2.0, "dwell": 1.0}
+    car = {"on": "portal", "kind": "mass", "mass": 50.0, "motion": motion, "inertia_along": True}
+    axial = {"body": "portal", "at": 1.0, "quantity": "axial_force"}
+    given = Study(kind="passage", body={"portal": rail}, carriage={"car": car}, sensor={"axial": axial})
+    assert not any("reads 0" in remark for remark in remarks(make_plan(given)))
+    found = engine.run(given)
+    assert [float(found.axial_max), float(found.axial_min)] == pytest.approx([100.0, -100.0], rel=0.05)
+    assert float(found.estimated_error.sel(result="axial_max")) > 0.1

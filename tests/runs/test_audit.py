@@ -23,15 +23,8 @@ from studies.protocol.parts import Work
 from studies.reporting.summary import exit_code
 from studies.results.formatting import number, scientific
 from studies.results.results import Results
-from studies.runs.audit import (
-    GROUP,
-    Verdict,
-    as_json,
-    audit_group,
-    relative_errors,
-    told_accuracy,
-    told_audit,
-)
+from studies.runs.audit import GROUP, audit_group
+from studies.runs.audit_findings import Verdict, as_json, relative_errors, told_accuracy, told_audit
 from studies.runs.not_audited import NONE_AUDITED, NONE_COMPARED, NONE_OF_THOSE_ASKED
 from studies.runs.runner import Outcome
 from tests.engine.build import beam, mass, shuttle, study

@@ -17,7 +17,7 @@ from studies.pictures.common.figures import Figure, draw, legend_beside, logarit
 from studies.results.axes import PACES, Axis
 from studies.results.formatting import counted, number, percent
 from studies.results.results import Results
-from studies.runs.audit import relative_errors
+from studies.runs.audit_findings import relative_errors
 
 LEAST = 1e-6  # what is smaller stands there, at the end of the logarithmic axis
 LEAST_POINTS = 2  # of a figure: a single number is a sentence
