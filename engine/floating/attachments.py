@@ -33,7 +33,7 @@ class Grip:
 
 
 class GripTables(NamedTuple):
-    """gripped (P): bodies; grips (P, GRIP), modes (P n, GRIP_MODE), shorter (P, n n)."""
+    """gripped (P): bodies; grips (P, GRIP), modes (P n, GRIP_MODE), shorter (P, n, n)."""
 
     gripped: Counts
     grips: Array
@@ -123,7 +123,7 @@ def grip_tables(bodies: Sequence[ElasticBody], grips: Sequence[Grip], n: int) ->
             modes[p, :N, columns.TWISTED : columns.TWISTED + 3] = fields[:, 3:] / grip.weights.sum()
             pairs[p, :N, :N] = np.einsum("s,sij->ij", grip.weights, shorter_at(body, grip.x))
     gripped = np.array([grip.body for grip in grips], dtype=np.int64)
-    return GripTables(gripped, table, modes.reshape(-1, columns.GRIP_MODE), pairs.reshape(len(grips), n * n))
+    return GripTables(gripped, table, modes.reshape(-1, columns.GRIP_MODE), pairs)
 
 
 def tip_tables(model: FloatingModel, n: int) -> TipTables:

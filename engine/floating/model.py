@@ -226,6 +226,7 @@ def _system(model: FloatingModel) -> System:
     numbers = np.zeros((B, columns.BODY))
     modes, pairs = np.zeros((B, n, columns.MODE)), np.zeros((B, n, n, columns.PAIR))
     track, shorter = np.zeros((B, CELLS, 6, 6, n)), np.zeros((B, CELLS, 6, n, n))
+    hanging_shorter = np.zeros((B, n, n))
     joint = 0
     for b, (name, body) in enumerate(model.bodies.items()):
         own = sum(one.body == name for one in model.joints)
@@ -234,7 +235,7 @@ def _system(model: FloatingModel) -> System:
         tree[b] = parent, model.first[name], N, joint, joint + own, int(parent < 0 and own == 0)
         joint += own
         _fill_integrals(body, numbers[b], modes[b, :N], pairs[b, :N, :N])
-        _hang(model, name, numbers[b], modes[b], pairs[b])
+        _hang(model, name, numbers[b], modes[b], hanging_shorter[b])
         if N:
             track[b, ..., :N] = body.track()
             shorter[b, :, :, :N, :N] = body.foreshortening().reshape(CELLS, 6, N, N)
@@ -250,6 +251,7 @@ def _system(model: FloatingModel) -> System:
         track,
         np.any(track != 0.0, axis=(1, 2)),
         shorter.reshape(B, CELLS, 6, n * n),
+        hanging_shorter,
         _riders(model, names),
         *grip_tables(list(model.bodies.values()), grips, n),
         np.array(
@@ -291,7 +293,7 @@ def _fill_integrals(body: ElasticBody, numbers: Array, modes: Array, pairs: Arra
     pairs[:, :, columns.STIFFENING], pairs[:, :, columns.STIFFENING + 1] = whole, along
 
 
-def _hang(model: FloatingModel, name: str, numbers: Array, modes: Array, pairs: Array) -> None:
+def _hang(model: FloatingModel, name: str, numbers: Array, modes: Array, shorter: Array) -> None:
     """Where a body hangs."""
     from scipy.spatial.transform import Rotation
 
@@ -308,7 +310,7 @@ def _hang(model: FloatingModel, name: str, numbers: Array, modes: Array, pairs: 
         N = parent.omega.size
         modes[:N, columns.HANGING_SHAPE : columns.HANGING_SHAPE + 3] = fields[:3].T
         modes[:N, columns.HANGING_TURN : columns.HANGING_TURN + 3] = fields[3:].T
-        pairs[:N, :N, columns.HANGING_SHORTER] = shorter_at(parent, np.array([at]))[0]
+        shorter[:N, :N] = shorter_at(parent, np.array([at]))[0]
 
 
 def _riders(model: FloatingModel, names: list[str]) -> Counts:

@@ -122,7 +122,10 @@ TERMS = {
     "course": ("f, about = times(factor, f), times(factor, about)", "pass"),
     "force on the frame": ("    add_vector(work.frames, b, FORCE, times(-system.grips[p, WEIGHT], f))\n", ""),
     "d x f on the frame": ("times(-1.0, cross(arm(system, p, x), f))", "no_vector()"),
-    "phi in d": ("return add(d, shared_vector(system.grips, p, ARM))", "return shared_vector(system.grips, p, ARM)"),
+    "phi in d": (
+        "d = add(combined(system.grip_modes, row, PUSHED, n, x.y, first), shared_vector(",
+        "d = add(no_vector(), shared_vector(",
+    ),
     "phi^T f": ("r = dot(shared_vector(system.grip_modes, p * widest + i, PUSHED), f)", "r = no_vector()[0]"),
     "torque on the frame": ("    add_vector(work.frames, b, TORQUE, times(-weight, about))\n", ""),
     "psi^T t": ("add_to(out, first + i, -weight * dot(turning, about))", "pass"),

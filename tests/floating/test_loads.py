@@ -9,7 +9,7 @@ from engine.floating.results import outcome
 from engine.scene.study import Study
 from tests.floating.scenes import ARM, FLYER, history, steps
 
-LENGTH, STIFFNESS = 10.0, 7e10 * 2e-7
+LENGTH, STIFFNESS, PER_METRE = 10.0, 7e10 * 2e-7, 1.2
 
 
 def cantilever(loads: dict[str, object], **frame: object) -> Study:
@@ -63,14 +63,18 @@ def test_an_axial_force_bends_or_straightens(axial: float) -> None:
     assert settled(cantilever(push)) == pytest.approx(Q * LENGTH**3 / (3.0 * STIFFNESS), rel=2e-3)
 
 
-def test_an_axial_load_along_a_beam_bends_it() -> None:
-    """As a column under its own weight: the lowest q that bends it is 7.837 E I/L^3 (Greenhill), so that half of it
-    makes a force across bend it about twice as far; by statics of the modes."""
+@pytest.mark.parametrize("by", ["a load", "its weight"])
+def test_an_axial_load_along_a_beam_bends_it(by: str) -> None:
+    """As a column under its own weight, or by that: the lowest q that bends it is 7.837 E I/L^3 (Greenhill), so that
+    half of it makes a force across bend it about twice as far; by statics of the modes."""
     q = 0.5 * 7.837 * STIFFNESS / LENGTH**3
-    loads = {
-        "across": {"on": "arm", "force": [0.0, 0.0, 5.0]},
-        "down": {"on": "arm", "between": [0.0, LENGTH], "force_per_metre": [-q, 0.0, 0.0]},
-    }
+    loads: dict[str, object] = {"across": {"on": "arm", "force": [0.0, 0.0, 5.0], "axes": "body"}}
+    if by == "a load":
+        loads["down"] = {"on": "arm", "between": [0.0, LENGTH], "force_per_metre": [-q, 0.0, 0.0]}
+        study = cantilever(loads, stiffening=True)
+    else:  # x is up
+        study = cantilever(loads, stiffening=True, turned=[0.0, 0.5 * np.pi, 0.0])
+        study = study.with_values({"gravity": q / PER_METRE, "body.arm.own_weight": True})
     # w'' E I = Q (L - x) + q int_x^L (w(s) - w(x)) ds, by differences
     x, h = np.linspace(0.0, LENGTH, 2001, retstep=True)
     slope = np.zeros(x.size)
@@ -80,7 +84,7 @@ def test_an_axial_load_along_a_beam_bends_it() -> None:
         slope = np.concatenate([[0.0], np.cumsum(0.5 * (further[1:] + further[:-1]) * h)])
     wanted = float(np.sum(0.5 * (slope[1:] + slope[:-1]) * h))
     assert wanted > 1.8 * 5.0 * LENGTH**3 / (3.0 * STIFFNESS)
-    assert settled(cantilever(loads, stiffening=True), 40.0) == pytest.approx(wanted, rel=2e-3)
+    assert settled(study, 40.0) == pytest.approx(wanted, rel=2e-3)
 
 
 def test_impulses_become_momenta() -> None:
@@ -129,6 +133,26 @@ def test_springs_between_bodies_keep_energy() -> None:
         assert np.ptp(potential) > 0.3 * potential[0] > 0.0
         drifts.append(np.abs(kinetic + potential - kinetic[0] - potential[0]).max() / potential[0])
     assert drifts[0] < 1e-3
+    assert np.log2(drifts[0] / drifts[1]) == pytest.approx(2.0, abs=0.3)
+
+
+def test_a_spring_at_a_track_that_grows_shorter_keeps_energy() -> None:
+    """It pulls obliquely at a beam's end, which comes nearer by half of int w'^2: order 2."""
+    spring = {"ends": [{"on": "arm"}, {"position": [14.0, 0.0, 3.0]}], "stiffness": 40.0, "length": 1.0}
+    study = Study(
+        kind="moving-frames",
+        gravity=0.0,
+        body={"arm": ARM | {"modes": 3}},
+        frame={"arm": {"stiffening": True}},
+        spring={"stay": spring},
+    )
+    drifts = []
+    for count in (4000, 8000):
+        model, marched = steps(study, 4.0, count, 10)
+        kinetic, potential = history(model, marched, "whole", 0, 2).T
+        assert np.ptp(potential) > 0.05 * potential[0] > 0.0
+        drifts.append(np.abs(kinetic + potential - potential[0]).max() / np.ptp(potential))
+    assert drifts[1] < 1e-4
     assert np.log2(drifts[0] / drifts[1]) == pytest.approx(2.0, abs=0.3)
 
 

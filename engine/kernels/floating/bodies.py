@@ -99,7 +99,8 @@ def modal_forces(system, lane, b, x, work, out):
         for j in range(n):
             pair = row * widest + j
             r = r + system.pairs[pair, MODAL_MASS] * lanes_at(x.a, (first + j,))
-            r = r + system.pairs[pair, STIFFNESS] * lanes_at(x.y, (first + j,))
+            stiffness = system.pairs[pair, STIFFNESS] - system.pairs[pair, STIFFENING] * acc[0]
+            r = r + stiffness * lanes_at(x.y, (first + j,))
         add_to(out, first + i, r)
     keep_vector(work.frames, b, FORCE, no_vector())
     keep_vector(work.frames, b, TORQUE, no_vector())

@@ -52,7 +52,7 @@ from engine.kernels.floating.vectors import (
 from engine.kernels.floating.work import ACCELERATION, ANGULAR, CONTACT, FORCE, SPIN, TORQUE, TOUCHED, add_to
 from engine.kernels.jit import called
 from engine.kernels.sines import hyperbolic_tangent
-from engine.kernels.vector import choose, everywhere, lanes_at, root
+from engine.kernels.vector import all_lanes, choose, everywhere, lanes_at, root
 
 
 @called
@@ -128,7 +128,7 @@ def carriage_forces(system, lane, c, x, work, out):
     k = system.riders[c, PLACE_COORDINATE]
     if k >= 0:
         add_to(out, k, dot(tangent, f) - along_track(lane, c, along[1], f, tangent))
-    push_modes(system, b, x, work, f, out)
+    push_modes(system, b, x, work, (f, pull_along(system, lane, c, along, work)), out)
     if turns:
         turn_modes(system, c, x, work, about, out)
 
@@ -141,15 +141,28 @@ def push_frame(work, b, d, f):
 
 
 @called
-def push_modes(system, b, x, work, f, out):
+def pull_along(system, lane, c, along, work):
+    """The force that a carriage needs along an undeformed track, which stiffens the bent one: products of deflections
+    are left out with what the shortening adds to its acceleration, which would balance them."""
+    b, (s, ds, dds) = system.riders[c, RIDDEN], along
+    origin, zero, height = shared_vector(system.bodies, b, ORIGIN), all_lanes(0.0), carried(lane, c, HEIGHT)
+    own, sprung = carried(lane, c, OWN_MASS), carried(lane, c, SPRUNG_MASS)
+    d, rate, change = (s + origin[0], zero + origin[1], zero + origin[2]), (ds, zero, zero), (dds, zero, zero)
+    below = acceleration_at(system, work, b, (d[0], d[1], d[2] + height), rate, change)
+    return own * below[0] + sprung * acceleration_at(system, work, b, d, rate, change)[0]
+
+
+@called
+def push_modes(system, b, x, work, forces, out):
     """A force of a carriage on the modes at its place; where the track between its origin and there grows shorter as it
-    bends, through that too."""
+    bends, the one along it through that too."""
     n, first, widest = system.tree[b, MODES], system.tree[b, FIRST], system.track.shape[4]
+    f, pull = forces
     for i in range(n):
         r = dot(vector(work.modes, i, SHAPE), f)
         if system.bodies[b, STIFFENS] > 0.0:
             for j in range(n):
-                r = r - foreshortening_at(system, b, i * widest + j, work) * lanes_at(x.y, (first + j,)) * f[0]
+                r = r - foreshortening_at(system, b, i * widest + j, work) * lanes_at(x.y, (first + j,)) * pull
         add_to(out, first + i, r)
 
 

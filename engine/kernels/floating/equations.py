@@ -14,7 +14,6 @@ from engine.kernels.floating.layout import (
     FIRST,
     FIRST_JOINT,
     HANGING_SHAPE,
-    HANGING_SHORTER,
     HANGING_TURN,
     KIND,
     MODES,
@@ -28,6 +27,7 @@ from engine.kernels.floating.layout import (
     TURNED,
 )
 from engine.kernels.floating.loads import link_forces, load_forces
+from engine.kernels.floating.tracks import shorter_by
 from engine.kernels.floating.vectors import (
     add,
     add_vector,
@@ -105,9 +105,7 @@ def gather(system, lane, b, x, work, out):
             turning = spin_of(t, shared_vector(system.modes, row + i, HANGING_TURN))
             add_to(out, first + i, dot(shared_vector(system.modes, row + i, HANGING_SHAPE), F) + dot(turning, T))
             if system.bodies[p, STIFFENS] > 0.0:  # the track up to there grows shorter as it bends
-                for j in range(n):
-                    shorter = system.pairs[(row + i) * system.track.shape[4] + j, HANGING_SHORTER]
-                    add_to(out, first + i, -shorter * lanes_at(x.y, (first + j,)) * F[0])
+                add_to(out, first + i, -1.0 * shorter_by(system.hanging_shorter, b, i, n, x.y, first) * F[0])
     add_vector(work.frames, p, FORCE, F)
     add_vector(work.frames, p, TORQUE, add(T, cross(vector(work.frames, b, HANGING_PLACE), F)))
 

@@ -15,9 +15,10 @@ from engine.kernels.floating.layout import (
     PLACE,
     PRISMATIC,
     SPHERICAL,
+    STIFFENS,
     TURNED,
 )
-from engine.kernels.floating.tracks import combined
+from engine.kernels.floating.tracks import combined, nearer
 from engine.kernels.floating.vectors import (
     add,
     add_vector,
@@ -70,7 +71,10 @@ def follow_frame(system, lane, b, x, work):
         n, first, row = system.tree[p, MODES], system.tree[p, FIRST], b * system.track.shape[4]
         place = add(place, combined(system.modes, row, HANGING_SHAPE, n, x.y, first))
         rate = combined(system.modes, row, HANGING_SHAPE, n, x.u, first)
-        shift(frames, b, place, rate, combined(system.modes, row, HANGING_SHAPE, n, x.a, first))
+        change = combined(system.modes, row, HANGING_SHAPE, n, x.a, first)
+        if system.bodies[p, STIFFENS] > 0.0:
+            place, rate, change = drawn_in(system, b, n, x, first, (place, rate, change))
+        shift(frames, b, place, rate, change)
         keep_vector(frames, b, HANGING_PLACE, place)
         if n:
             t = combined(system.modes, row, HANGING_TURN, n, x.y, first)
@@ -83,6 +87,16 @@ def follow_frame(system, lane, b, x, work):
     look_along(frames, b, shared_matrix(system.bodies, b, TURNED))
     for j in range(system.tree[b, FIRST_JOINT], system.tree[b, END_JOINT]):
         follow_joint(system, j, b, x, work)
+
+
+@called
+def drawn_in(system, b, n, x, first, moving):
+    """Place, velocity and acceleration where a body hangs on a track that grows shorter as it bends, -1/2 q G q."""
+    G, (d, rate, change) = system.hanging_shorter, moving
+    nearing = nearer(G, b, n, x.y, x.u, first)
+    coming = nearer(G, b, n, x.y, x.a, first) + nearer(G, b, n, x.u, x.u, first)
+    d = (d[0] - 0.5 * nearer(G, b, n, x.y, x.y, first), d[1], d[2])
+    return d, (rate[0] - nearing, rate[1], rate[2]), (change[0] - coming, change[1], change[2])
 
 
 @called

@@ -6,11 +6,11 @@ base + x'' + U x' + Y x: gyroscopic, Euler and centrifugal terms. The modes of a
     sum_j int phi_i . (phi_j q_j'' + U phi_j q_j' + Y phi_j q_j) dm + d_i q_i' + k_ij q_j = -int phi_i . base dm
 
 and with what a carriage needs at its place, (10)-(21). In a step q = q* + of_y q'' and q' = q'* + of_u q'', so that
-T = 1 + of_u U + of_y Y stands for 1 in the mass matrix. What a carriage stiffens a track by is taken from the force
-that it has if accelerations go on as they did; directions of torques follow deflections in first order.
+T = 1 + of_u U + of_y Y stands for 1 in the mass matrix. What a carriage stiffens a track by is
+linear in them, and directions of torques follow them in first order.
 """
 
-from engine.kernels.floating.carriages import acceleration_at, carried, ridden, touched
+from engine.kernels.floating.carriages import acceleration_at, carried, pull_along, ridden, touched
 from engine.kernels.floating.following import follow_frame
 from engine.kernels.floating.layout import (
     DAMPER,
@@ -34,7 +34,7 @@ from engine.kernels.floating.layout import (
     WEIGHT,
 )
 from engine.kernels.floating.loads import load_at
-from engine.kernels.floating.state import advance, factor, going_on, solve
+from engine.kernels.floating.state import advance, factor, solve
 from engine.kernels.floating.tracks import CURVE, SHAPE, SLOPE, foreshortening_at, shapes_at
 from engine.kernels.floating.vectors import (
     add,
@@ -185,7 +185,7 @@ def carriage(system, lane, c, ways, state, solver):
             by = leaning(system, b, vector(work.modes, i, SHAPE), vector(work.implied, row + j, 0))
             add_to_matrix(solver.fresh, k, system.tree[b, FIRST] + j, mass * by)
     if system.bodies[b, STIFFENS] > 0.0:
-        stiffen(system, b, along_track(system, lane, c, f, state, work), ways, state, solver)
+        stiffen(system, b, pull_along(system, lane, c, along, work), ways, state, solver)
 
 
 @called
@@ -256,21 +256,6 @@ def implied(system, b, j, along, ways, work):
 
 
 @called
-def along_track(system, lane, c, f, state, work):
-    """Force of a carriage along its track at the step's end, where accelerations go on as they did; f: as far as it is
-    known."""
-    b, z = system.riders[c, RIDDEN], system.riders[c, SPRUNG_COORDINATE]
-    row, mass, found = c * (system.track.shape[4] + 1), carried(lane, c, OWN_MASS), f[0]
-    if z >= 0:
-        mass = mass + carried(lane, c, SPRUNG_MASS)
-        rising = carried(lane, c, SPRUNG_MASS) * lanes_at(work.implied, (row + system.track.shape[4], 0))
-        found = found + rising * going_on(state, z)
-    for j in range(system.tree[b, MODES]):
-        found = found + mass * lanes_at(work.implied, (row + j, 0)) * going_on(state, system.tree[b, FIRST] + j)
-    return found
-
-
-@called
 def stiffen(system, b, along, ways, state, solver):
     """A force along the track at the place that was looked up last pulls at it up to there, where it grows shorter as
     it bends."""
@@ -297,7 +282,7 @@ def load(system, lane, q, ways, state, solver):
             other = shared_vector(system.grip_modes, p * widest + j, TWISTED)
             by = (-0.5 * weight) * dot(cross(other, turned), about)
             if system.bodies[b, STIFFENS] > 0.0:
-                by = by + system.grip_shorter[p, i * widest + j] * f[0]
+                by = by + system.grip_shorter[p, i, j] * f[0]
             left = left + by * lanes_at(state.tried.y, (first + j,))
             add_to_matrix(solver.fresh, first + i, first + j, ways[0] * by)
         add_to(state.residual, first + i, left)

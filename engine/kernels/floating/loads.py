@@ -16,7 +16,7 @@ from engine.kernels.floating.layout import (
     TWISTED,
     WEIGHT,
 )
-from engine.kernels.floating.tracks import combined
+from engine.kernels.floating.tracks import combined, nearer, shorter_by
 from engine.kernels.floating.vectors import (
     add,
     add_vector,
@@ -69,8 +69,7 @@ def push(system, p, f, x, work, out):
     for i in range(n):
         r = dot(shared_vector(system.grip_modes, p * widest + i, PUSHED), f)
         if system.bodies[b, STIFFENS] > 0.0:  # the track up to there grows shorter as it bends
-            for j in range(n):
-                r = r - system.grip_shorter[p, i * widest + j] * lanes_at(x.y, (first + j,)) * f[0]
+            r = r - shorter_by(system.grip_shorter, p, i, n, x.y, first) * f[0]
         add_to(out, first + i, -1.0 * r)
 
 
@@ -90,8 +89,11 @@ def twist(system, p, about, x, work, out):
 def arm(system, p, x):
     """Place of a grip in the frame of its body, times its weight."""
     b, row = system.gripped[p], p * system.track.shape[4]
-    d = combined(system.grip_modes, row, PUSHED, system.tree[b, MODES], x.y, system.tree[b, FIRST])
-    return add(d, shared_vector(system.grips, p, ARM))
+    n, first = system.tree[b, MODES], system.tree[b, FIRST]
+    d = add(combined(system.grip_modes, row, PUSHED, n, x.y, first), shared_vector(system.grips, p, ARM))
+    if system.bodies[b, STIFFENS] > 0.0:
+        d = (d[0] - 0.5 * nearer(system.grip_shorter, p, n, x.y, x.y, first), d[1], d[2])
+    return d
 
 
 @called
@@ -127,6 +129,8 @@ def over_ground_at(system, p, x, work):
         return add(no_vector(), shared_vector(system.grips, p, ARM)), no_vector()
     n, first = system.tree[b, MODES], system.tree[b, FIRST]
     d, rate = arm(system, p, x), combined(system.grip_modes, row, PUSHED, n, x.u, first)
+    if system.bodies[b, STIFFENS] > 0.0:
+        rate = (rate[0] - nearer(system.grip_shorter, p, n, x.y, x.u, first), rate[1], rate[2])
     v = add(vector(work.frames, b, VELOCITY), add(cross(vector(work.frames, b, SPIN), d), rate))
     E = matrix(work.frames, b, ATTITUDE)
     return add(vector(work.frames, b, POSITION), turned_out(E, d)), turned_out(E, v)

@@ -65,6 +65,24 @@ def foreshortening_at(system, b, pair, work):
 
 
 @called
+def shorter_by(table, place, i, n, q, first):
+    """sum_j G_ij q_j at a place of a table (places, n, n)."""
+    found = all_lanes(0.0)
+    for j in range(n):
+        found = found + table[place, i, j] * lanes_at(q, (first + j,))
+    return found
+
+
+@called
+def nearer(table, place, n, q, p, first):
+    """sum_ij G_ij q_i p_j there: a place comes nearer to its track's beginning by half of that of q and q."""
+    found = all_lanes(0.0)
+    for i in range(n):
+        found = found + lanes_at(q, (first + i,)) * shorter_by(table, place, i, n, p, first)
+    return found
+
+
+@called
 def combined(table, first_row, column, modes, q, first):
     """sum_i of three columns, which all lanes share, times coordinates q, the first of which has that number."""
     x, y, z = all_lanes(0.0), all_lanes(0.0), all_lanes(0.0)
