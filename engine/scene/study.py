@@ -253,8 +253,19 @@ class Study(Scene):
         return found
 
     def with_values(self, values: Mapping[str, Any]) -> Study:
-        """The study with other values at dotted keys, validated as a whole; its text is the new study as TOML."""
+        """The study with other values at dotted keys, validated as a whole; its text is the new study as TOML.
+
+        Raises BadInput, also for a key that an axis of the sweep sets, unless that axis is given anew.
+        """
         data = self._data
+        for name, axis in self.sweep.axes.items():
+            if (lost := next((path for path in axis.of if path in values), None)) and not _is_of_sweep(name, values):
+                raise self._source.fault(
+                    lost,
+                    f"sweep.{name} sets this key in every variant, whatever stands here",
+                    received=f"{lost} = {shortened(values[lost])}",
+                    remedy=f"study.without_sweep().with_values(...), or other values of sweep.{name}",
+                )
         for path, value in values.items():
             try:
                 data = with_value(data, path, value)
@@ -266,6 +277,11 @@ class Study(Scene):
         """The base scene alone."""
         data = {key: table for key, table in self._data.items() if key != "sweep"}
         return Study(document_of(data, self._source.name))
+
+
+def _is_of_sweep(name: str, values: Mapping[str, Any]) -> bool:
+    """Whether values at dotted keys are also those of an axis."""
+    return any(path == "sweep" or path.startswith(f"sweep.{name}") for path in values)
 
 
 def json_schema(kinds: Sequence[str]) -> dict[str, Any]:

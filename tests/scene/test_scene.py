@@ -89,6 +89,18 @@ def test_with_values() -> None:
         study.with_values({"carriage.table.motion.speed.x": 1.0})
 
 
+def test_a_swept_key_is_not_given_another_value() -> None:
+    """Which no variant would have."""
+    swept = {"sweep": {"load": {"of": "carriage.table.mass", "values": [1.0, 2.0]}}}
+    study = load(MINIMAL).with_values(swept)
+    with pytest.raises(BadInput, match=r"carriage\.table\.mass: sweep\.load sets this key in every variant") as error:
+        study.with_values({"carriage.table.mass": 5.0})
+    assert "without_sweep()" in str(error.value) and "values of sweep.load" in str(error.value)
+    assert study.without_sweep().with_values({"carriage.table.mass": 5.0}).value("carriage.table.mass") == 5.0
+    again = study.with_values({"carriage.table.mass": 5.0, "sweep.load.values": [3.0]})
+    assert again.sweep.axes["load"].values == (3.0,)
+
+
 def test_numbers_and_units() -> None:
     study = load(SAMPLE)
     numbers = study.numbers()
