@@ -22,8 +22,8 @@ MOST_CYCLES = 1000  # of a carriage that goes out and back: a variant holds all 
 def refuse_scene(study: Study) -> None:
     """Raise BadInput for what a study has that frames that move do not know."""
     fault = study.source.fault
-    if study.initial == "equilibrium":
-        raise fault("initial", "bodies in frames that move start undeformed", expected='"rest"')
+    if study.start == "equilibrium":
+        _check_rests(study)
     for name, body in study.body.items():
         if not body.own_weight and study.gravity > 0.0:
             what = "bodies in frames that move carry their own weight"
@@ -32,6 +32,25 @@ def refuse_scene(study: Study) -> None:
         _check_carriage(study, name, carriage)
     for name, sensor in study.sensor.items():
         _check_sensor(study, name, sensor)
+
+
+def _check_rests(study: Study) -> None:
+    """Refuse what does not stay where it starts, or starts elsewhere than in equilibrium."""
+    fault = study.source.fault
+    for name, frame in study.frame.items():
+        for k, joint in enumerate(frame.joints):
+            here = f"frame.{name}.joints.{k}"
+            if not joint.is_held:
+                what = "no equilibrium is known where nothing holds this joint"
+                expected = 'a motion or a stiffness of it, or initial = "rest"'
+                raise fault(here, what, expected=expected, received=joint.kind)
+            if joint.told_start:
+                what = "a joint that starts in equilibrium is told no other start"
+                raise fault(f"{here}.{joint.told_start}", what, expected='no such key, or initial = "rest"')
+    for name, carriage in study.carriage.items():
+        if carriage.motion.slides:
+            what = "no equilibrium is known of a carriage that slides freely"
+            raise fault(f"carriage.{name}.motion.kind", what, expected='another motion, or initial = "rest"')
 
 
 def _check_carriage(study: Study, name: str, carriage: Carriage) -> None:

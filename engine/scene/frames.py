@@ -60,6 +60,16 @@ class Joint(SpecOfKind):
         return False
 
     @property
+    def is_held(self) -> bool:
+        """Whether a motion or a spring holds it."""
+        return False
+
+    @property
+    def told_start(self) -> str:
+        """The key that tells where it starts or how fast, "" if none does."""
+        return ""
+
+    @property
     def turned_about(self) -> Vector | None:
         """The axis about which a motion turns what it holds, if there is one."""
         return None
@@ -92,6 +102,14 @@ class AxisJoint(Joint):
     @property
     def is_driven(self) -> bool:
         return self.motion is not None and self.stiffness == 0.0 and self.damping == 0.0
+
+    @property
+    def is_held(self) -> bool:
+        return self.is_driven or self.stiffness > 0.0
+
+    @property
+    def told_start(self) -> str:
+        return next((key for key in ("start", "rate") if getattr(self, key) is not None), "")
 
     @property
     def at_start(self) -> tuple[Array, Array]:

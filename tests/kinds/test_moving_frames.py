@@ -165,7 +165,7 @@ SENSOR = {"body": "beam", "at": 0.0}
 @pytest.mark.parametrize(
     ("tables", "words"),
     [
-        ({"initial": "equilibrium"}, "start undeformed"),
+        ({"initial": "equilibrium"}, "slides freely"),
         ({"question": {}}, r"question\.duration"),
         ({"output": {"histories": {"every": 3}}}, "some 800 times"),
         ({"solver": {"scheme": "central-difference", "fidelity": "force"}}, "have no such model"),

@@ -72,7 +72,7 @@ class System(NamedTuple):
     these arms, each after its parent.
     leans (B, 3): whether a body's modes move it along its x, y and z; pairing (K, 3): bodies, and two of their modes
     that act on each other. given: whether steps take frames and places of carriages as given in time, and need no
-    iteration.
+    iteration. settles: whether marches begin in static equilibrium.
     """
 
     tree: IntArray
@@ -103,6 +103,7 @@ class System(NamedTuple):
     leans: BoolArray
     pairing: IntArray
     given: bool
+    settles: bool
 
 
 class Coordinates(NamedTuple):

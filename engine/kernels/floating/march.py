@@ -31,7 +31,7 @@ from engine.kernels.floating.layout import (
     Lane,
 )
 from engine.kernels.floating.motions import motions_at
-from engine.kernels.floating.newton import factor_masses, solve_accelerations, step
+from engine.kernels.floating.newton import factor_masses, settle, solve_accelerations, step
 from engine.kernels.floating.observe import observe, observe_whole
 from engine.kernels.floating.state import (
     CODE,
@@ -211,6 +211,10 @@ def start(system, lane, state, solver):
     for b in range(system.tree.shape[0]):  # those that rest are followed once
         follow_frame(system, lane, b, state.now, work)
     everyone = lanes_at(lane.step, (0,)) > 0.0
+    if system.settles:
+        copy(work.motions, solver.before)
+        settle(system, lane, everyone, state, solver)
+        copy(solver.before, work.motions)
     put_lanes(memory, (EVENT,), near_of(lane))
     next_events(lane.events, everyone, memory)
     solve_accelerations(system, lane, everyone, state, solver)

@@ -1,4 +1,5 @@
-"""Newton's method for the accelerations at the end of a step, and where a march or a piece of a motion begins.
+"""Newton's method for the accelerations at the end of a step, where a march or a piece of a motion begins, and for
+static equilibrium before that.
 
 The tangent is made of differences of the residual, and kept for as many steps as the iteration converges fast. Lanes
 go side by side, and each decides for itself: a lane that is done, or has failed, stays where it is while others go on,
@@ -8,7 +9,7 @@ so that its numbers do not depend on its neighbours.
 import numpy as np
 
 from engine.kernels.floating.equations import residual
-from engine.kernels.floating.layout import DIVERGED, LENGTH, MASS, NOT_CONVERGED
+from engine.kernels.floating.layout import DIVERGED, FIRST, LENGTH, MASS, MODES, NOT_CONVERGED
 from engine.kernels.floating.state import (
     CODE,
     DONE,
@@ -37,6 +38,11 @@ STALLED = 0.5  # a small correction that is no smaller than so much of the one b
 SLOW = 0.1  # a correction over the one before it, from which on the tangent of a lane is made anew
 MOST_ITERATIONS = 25
 STILL = 1e-9  # of a length within a step: what moves by less rests
+#: Of statics, whose coordinates are counted in lengths of their body, rad or m: by how much they are moved for
+#: differences, how far one goes at most by a correction, and the correction at which the iteration ends, as the next
+#: one is far below rounding.
+MOVED_BY, FARTHEST, CLOSE = 1e-7, 0.1, 1e-9
+MOST_CORRECTIONS = 100
 
 
 @called
@@ -190,3 +196,76 @@ def step(system, lane, scheme, who, h, state, solver):
     residual(system, lane, state.tried, solver.work, state.residual)
     correct(who & sound(memory), state, solver)
     advance(state, scheme, h)
+
+
+@called
+def settle(system, lane, who, state, solver):
+    """Static equilibrium of some lanes, whose motions stand still where they begin, into the state; lanes that would
+    fall over, or find none, do not converge."""
+    memory, work, x = solver.memory, solver.work, state.tried
+    N = state.weight.shape[0]
+    for m in range(work.motions.shape[0]):
+        put_lanes(work.motions, (m, 1), all_lanes(0.0))
+        put_lanes(work.motions, (m, 2), all_lanes(0.0))
+    for k in range(N):
+        put_lanes(x.y, (k,), lanes_at(state.now.y, (k,)))
+        put_lanes(x.u, (k,), all_lanes(0.0))
+        put_lanes(x.a, (k,), all_lanes(0.0))
+    measure(system, state.weight)
+    put_lanes(memory, (DONE,), choose(who, all_lanes(0.0), 1.0))
+    stable = all_lanes(1.0)
+    for _ in range(MOST_CORRECTIONS):
+        stable = stiffness(system, lane, state, solver)
+        put_where(come_closer(state, solver) <= CLOSE, memory, (DONE,), all_lanes(1.0))
+        if everywhere(of(memory, DONE) > 0.5):
+            break
+    lost = who & ((of(memory, DONE) < 0.5) | (stable < 0.5))
+    put_where(lost, memory, (CODE,), all_lanes(1.0 * NOT_CONVERGED))
+    for k in range(N):
+        put_where(who, state.now.y, (k,), lanes_at(x.y, (k,)))
+
+
+@called
+def measure(system, weight):
+    """One length of a body in its elastic coordinates, whose modal masses are 1; else 1."""
+    for k in range(weight.shape[0]):
+        put_lanes(weight, (k,), all_lanes(1.0))
+    for b in range(system.tree.shape[0]):
+        for k in range(system.tree[b, FIRST], system.tree[b, FIRST] + system.tree[b, MODES]):
+            put_lanes(weight, (k,), all_lanes(system.bodies[b, LENGTH] * np.sqrt(system.bodies[b, MASS])))
+
+
+@called
+def stiffness(system, lane, state, solver):
+    """What is left of statics into the residual, and the factors of its derivative by the coordinates into the fresh
+    matrix; 1 where that is positive definite."""
+    x, M = state.tried, solver.fresh
+    N = M.shape[0]
+    for k in range(N):
+        by, y = MOVED_BY * lanes_at(state.weight, (k,)), lanes_at(x.y, (k,))
+        put_lanes(x.y, (k,), y + by)
+        residual(system, lane, x, solver.work, solver.other)
+        put_lanes(x.y, (k,), y - by)
+        residual(system, lane, x, solver.work, state.residual)
+        for i in range(N):
+            put_lanes(M, (i, k), (lanes_at(solver.other, (i,)) - lanes_at(state.residual, (i,))) / (2.0 * by))
+        put_lanes(x.y, (k,), y)
+    residual(system, lane, x, solver.work, state.residual)
+    found = factor(M)
+    for k in range(N):
+        found = choose(lanes_at(M, (k, k)) > 0.0, found, 0.0)
+    return found
+
+
+@called
+def come_closer(state, solver):
+    """One correction of the lanes that are under way; the largest part of it."""
+    y, largest, going = state.tried.y, all_lanes(0.0), of(solver.memory, DONE) < 0.5
+    solve(solver.fresh, state.residual)
+    for k in range(y.shape[0]):
+        part = size_of(lanes_at(state.residual, (k,))) / lanes_at(state.weight, (k,))
+        largest = choose(part > largest, part, largest)
+    share = choose(largest > FARTHEST, FARTHEST / largest, 1.0)
+    for k in range(y.shape[0]):
+        put_where(going, y, (k,), lanes_at(y, (k,)) - share * lanes_at(state.residual, (k,)))
+    return choose(largest < np.inf, largest, np.inf)
