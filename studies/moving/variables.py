@@ -43,7 +43,7 @@ def _ends(name: str, units: str, words: str, meaning: str) -> list[Variable]:
 
 
 def _history(name: str, dims: tuple[str, ...], units: str, words: str, meant: str = "") -> Variable:
-    gone = "NaN from the moment on at which a carriage has slid over an end of its track"
+    gone = "NaN from the moment on at which a carriage is over an end of its track"
     return Variable(
         name,
         ("station", *dims),
@@ -115,7 +115,7 @@ RESULTS = (
         meaning="kinetic, elastic, of springs and height; by damping, friction and what is driven, else by the steps",
     ),
     Variable(
-        "duration", units="s", long_name="time that was marched", meaning="less where a carriage slid over an end"
+        "duration", units="s", long_name="time that was marched", meaning="less where a carriage went over an end"
     ),
     *(
         Variable(
