@@ -179,6 +179,31 @@ def _reads_nothing(looked: Looked) -> Iterator[str]:
             )
 
 
+def _nothing_across(looked: Looked) -> Iterator[str]:
+    """Position errors across the plane in which an arm bends and its joints move it."""
+    model = looked.samples[0].model
+    for name, sensor in model.tips.items():
+        carriers = model.carriers(str(sensor.body))
+        if abs(sensor.way[1]) > 1.0 - ROUNDING and all(_stays_in_plane(model, carrier) for carrier in carriers):
+            bending = " or ".join(f"frame.{carrier}" for carrier in carriers if model.bodies[carrier].omega.size)
+            remedy = f": lateral_modes of {bending} bring that" if bending else ""
+            yield f"sensor {name} reads 0: nothing that carries it moves or bends along y over the ground{remedy}"
+
+
+def _stays_in_plane(model: FloatingModel, name: str) -> bool:
+    """Whether a body keeps the y axis of what it hangs on, and does not bend along it, nor twist."""
+    from engine.floating.elastic import ABOUT_X, ABOUT_Z, Y
+    from engine.kernels.floating.layout import PRISMATIC, REVOLUTE
+
+    body, turned = model.bodies[name], np.array(model.frame(name).turned)
+    whole = {REVOLUTE: 1.0, PRISMATIC: 0.0}  # of an axis that is along y, of what turns and of what slides
+    joints = (joint for joint in model.joints if joint.body == name)
+    kept = all(abs(abs(joint.axis[Y]) - whole.get(joint.kind, np.inf)) < ROUNDING for joint in joints)
+    shapes = np.abs(body.fields(np.linspace(0.0, body.length, PLACES), (0,))[0]).max(axis=(0, 2), initial=0.0)
+    flat = (shapes[[Y, ABOUT_X, ABOUT_Z]] <= ROUNDING * shapes.max()).all()
+    return bool(kept and flat and not np.delete(turned, Y).any())
+
+
 def _doubtful(looked: Looked) -> Iterator[str]:
     from engine.batch.plausibility import doubtful, half_united
 
@@ -187,4 +212,4 @@ def _doubtful(looked: Looked) -> Iterator[str]:
 
 
 REMARKS: tuple[Callable[[Looked], Iterator[str]], ...]
-REMARKS = (_doubtful, _degrees, _turned_fast, _over_an_end, _goes_on, _stands, _reads_nothing)
+REMARKS = (_doubtful, _degrees, _turned_fast, _over_an_end, _goes_on, _stands, _reads_nothing, _nothing_across)

@@ -18,6 +18,7 @@ def turned_to(*values: Any, **more: Any) -> Study:
 HUNG = {"arm": {"joints": [TURN]}, "tool": {"on": "arm"}}
 SPIN = {"kind": "revolute", "axis": [0, 1, 0], "motion": {"kind": "spin-up", "rate": 0.1, "time": 2.0}}
 LATER = TURN | {"motion": {"kind": "waypoints", "times": [0, 1.5], "values": [0, -0.1]}}
+ASIDE = {"body": "arm", "at": 10.0, "quantity": "position_error", "direction": "y"}
 MOMENT = {"quantity": "bending_moment"}
 
 
@@ -46,6 +47,9 @@ SAID = {
     "sensor low reads 0: its body has no displacement as it does not bend": with_tool(
         frame=HUNG, sensor={"low": {"body": "tool", "at": 0.5}}
     ),
+    "sensor side reads 0: nothing that carries it moves or bends along y over the ground: lateral_modes of frame.arm": (
+        driven(sensor={"side": ASIDE})
+    ),
     "sensor low reads 0: its body has no bending moment there, as at a support or a free end": driven(
         sensor={"low": {"body": "arm", "at": 10.0, "quantity": "bending_moment"}}
     ),
@@ -65,4 +69,9 @@ def test_nothing_is_remarked_of_ordinary_studies() -> None:
     assert KIND.remarks(driven(sensor=read)) == ()
     assert KIND.remarks(driven(**slow)) == ()
     assert KIND.remarks(with_tool(frame=HUNG)) == ()
-    assert len(REMARKS) == 7
+    assert KIND.remarks(driven(sensor={"far": ASIDE | {"direction": "z"}})) == ()
+    bends = {"joints": [TURN], "lateral_modes": 1, "lateral_second_moment": 2e-7}
+    assert KIND.remarks(driven(sensor={"side": ASIDE}, frame={"arm": bends})) == ()
+    about_z = TURN | {"axis": [0, 0.1, 1]}
+    assert KIND.remarks(driven(sensor={"side": ASIDE}, joints=[about_z, TURN])) == ()
+    assert len(REMARKS) == 8
