@@ -85,7 +85,7 @@ class MovingFrames(PiecedKind):
         return gather(pieces, study, self.name)
 
     def findings(self, results: Results) -> list[str]:
-        return findings.answer(results)
+        return findings.answer(results, question_of(results.study, Question).duration)
 
 
 KIND = MovingFrames()

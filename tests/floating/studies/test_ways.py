@@ -8,7 +8,9 @@ import pytest
 import studies
 from results_schema.errors import BadInput
 from results_schema.status import Status
+from studies.kinds.moving_frames import KIND
 from studies.protocol.study import kind_of
+from studies.results.results import Results
 from tests.floating.studies.scenes import driven
 
 SPEED = "carriage.trolley.motion.speed"
@@ -60,6 +62,8 @@ def test_variants_that_run_off_end_there(joint: dict[str, Any] | None) -> None:
     assert found["trolley_position_max"].values == pytest.approx([5.1, 10.0, 10.0], abs=2e-2)
     gone = np.isnan(found["trolley_contact_force"]).values
     assert not gone[:2].any() and not gone[2, 0] and gone[2, -1]
+    answer = " ".join(KIND.findings(Results.of(found)))
+    assert "A carriage goes over an end of its track in 1 variant of 3, soonest after 0.825 s at v 12 m/s" in answer
 
 
 def test_shorter_marches_keep_it_on_its_body() -> None:
