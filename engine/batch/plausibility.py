@@ -13,7 +13,7 @@ from engine.bodies.modal.modal_body import ModalBody
 from engine.model.lane_table import moving_mass, weight
 from engine.observation.signals import build_sensors
 from engine.scene.study import Study
-from engine.scene.sweep import broken
+from engine.scene.sweep import Cases, broken
 from engine.scene.variants import SpringKeys
 from engine.statics.directions import left_out, told_of
 from engine.study_file.refusals import value_at
@@ -66,7 +66,7 @@ def sprung(plan: Plan) -> dict[str, tuple[Array, Array]]:
 
 def _slow(plan: Plan) -> Iterator[str]:
     for table, (frequencies, _) in sprung(plan).items():
-        if frequencies.min() < SLOW and not _has_unit(plan.study, f"{table}.stiffness"):
+        if frequencies.min() < SLOW and not has_unit(plan.study, f"{table}.stiffness"):
             yield (
                 f"the sprung mass of {table.replace('.', ' ')} swings at {frequencies.min():.2g} Hz on its spring: "
                 "were kilonewtons per metre meant?"
@@ -176,18 +176,19 @@ def _along(grid: SceneGrid, number: int) -> float:
     return largest * float((moving_mass(grid.scene, grid.values, number) * pace**2).max())
 
 
-def _doubtful(plan: Plan) -> Iterator[str]:
-    for doubt in plan.study.doubts():
-        if found := broken(plan.study, plan.cases, doubt):
+def doubtful(study: Study, cases: Cases) -> Iterator[str]:
+    """Numbers that are hardly meant."""
+    for doubt in study.doubts():
+        if found := broken(study, cases, doubt):
             values = found[0]
             said = f"{doubt.where} = {doubt.amount(values)}: {doubt.what}, expected {doubt.expected}"
             yield f"{said}; {doubt.meant(values) or 'is the unit right?'}"
 
 
-def _half_united(plan: Plan) -> Iterator[str]:
+def half_united(study: Study) -> Iterator[str]:
     """Of lists alone: the ends of a range are refused."""
-    for name, axis in plan.study.sweep.axes.items():
-        unit = plan.study.unit(axis.of[0])
+    for name, axis in study.sweep.axes.items():
+        unit = study.unit(axis.of[0])
         if unit is not None and (mixed := axis.half_united()):
             united, bare = mixed
             yield f'sweep.{name} lists {bare:g} without a unit beside "{united}": is {bare:g} {unit.typed} meant?'
@@ -244,7 +245,7 @@ def _racing(plan: Plan) -> Iterator[str]:
     tops = {}
     for number, tie in enumerate(plan.base.carriages):
         table = plan.study.source.written(f"carriage.{tie.name}")
-        if not _has_unit(plan.study, f"{table}.motion.speed"):
+        if not has_unit(plan.study, f"{table}.motion.speed"):
             speeds = (g.scene.carriages[number].rider.top_speed / _time_scale(g) for g in plan.grids)
             tops[table] = max(float(speed.max()) for speed in speeds), plan.study.carriage[tie.name].motion.pace
     table, (top, pace) = max(tops.items(), key=lambda found: found[1][0], default=("", (0.0, None)))
@@ -306,10 +307,10 @@ def _pressing(grid: SceneGrid, body: int, carriages: Iterable[int]) -> tuple[flo
 def _weighs_with_unit(study: Study, carriage: str) -> bool:
     """Whether anything that makes the weight of a carriage is written with a unit."""
     own, table = study.carriage[carriage], study.source.written(f"carriage.{carriage}")
-    return any(_has_unit(study, f"{table}.{key}") for key in (*own.masses, *own.forces))
+    return any(has_unit(study, f"{table}.{key}") for key in (*own.masses, *own.forces))
 
 
-def _has_unit(study: Study, path: str) -> bool:
+def has_unit(study: Study, path: str) -> bool:
     """Whether the values of a dotted key, those of a sweep where it is swept, are written with a unit."""
     swept = [axis.values or (axis.from_, axis.to) for axis in study.sweep.axes.values() if path in axis.of]
     try:
@@ -373,8 +374,8 @@ REMARKS: tuple[Callable[[Plan], Iterator[str]], ...]
 REMARKS = (
     _partly_inert,
     _braking,
-    _doubtful,
-    _half_united,
+    lambda plan: doubtful(plan.study, plan.cases),
+    lambda plan: half_united(plan.study),
     _unsupported,
     _released,
     _leaves_between,

@@ -36,6 +36,9 @@ STATIONS = 800  # at which histories are compared and kept
 #: Of its limit: joints and masses shift the frequencies of bodies; where too far, measured errors show it.
 FAR_WITHIN = 0.8
 ENOUGH = 0.5  # of the tolerance by which an answer may be told to be off, as in a march of bodies that stand
+#: Of the largest of a signal: a coarser march that is further off tells nothing but that it failed, as Fox-Goodwin's
+#: beyond its limit, which joints and masses that shift frequencies bring nearer.
+UNLIKE = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,6 +140,7 @@ def converge(
             modes, steps, coarsest = np.full(V, model.modes), np.full(V, level.steps), level.steps
             continue
         apart = differences(model, found.of(active), now)
+        unlike = np.isnan(change[:, active]).all(axis=0) & (apart > UNLIKE).any(axis=0)
         by_steps = np.maximum(left_over(apart, change[:, active]), now.sooner)
         told = by_steps + rung.left_out[:, None]
         error[:, active], change[:, active] = told + rung.by_fixed.told(own.columns, own.size), apart
@@ -148,7 +152,7 @@ def converge(
         # more steps are of no use where it is the model that misses the tolerance
         by_model = worst(np.broadcast_to(rung.left_out[:, None], told.shape), results, own)
         done = worst(by_steps, results, own) <= np.where(by_model > 1.0, by_model, ENOUGH * (1.0 - by_model))
-        active = active[~done & ~hopeless]
+        active = active[(~done | unlike) & ~hopeless]
         if not active.size:
             break
     assert found is not None

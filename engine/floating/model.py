@@ -362,10 +362,10 @@ def _readings(model: FloatingModel) -> tuple[Array, Counts]:
 
 def _smooth(model: FloatingModel) -> Counts:
     """Signals that go on as smoothly as coordinates do: what sensors read of these, also after stops, and places along
-    tracks."""
+    tracks of what slides by itself: given motions may stop at an instant, over which a parabola would pass."""
     sensors = [number for number, sensor in enumerate(model.study.sensor.values()) if not sensor.reads.rate]
     first = model.signal_of("carriages")
-    places = [first + OF_CARRIAGE * c for c in range(len(model.study.carriage))]
+    places = [first + OF_CARRIAGE * c for c, name in enumerate(model.study.carriage) if name in model.places]
     stops = [model.signal_of("stops") + t for t in range(len(model.tips))]
     return np.array([*sensors, *places, *stops], dtype=np.int64)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
     from engine.scene.study import Study
 
 HELD = 1e-9  # of the largest: a shape below is zero
+#: What the archive has of every carriage, by what sensors would read of it, and of its body where it stands.
+OF_CARRIAGE, UNDER_CARRIAGE = {"contact_force": "contact_force"}, {"acceleration": "acceleration_z"}
 MOST_CYCLES = 1000  # of a carriage that goes out and back: a variant holds all its pieces
 
 
@@ -75,13 +78,27 @@ def _check_sensor(study: Study, name: str, sensor: Sensor) -> None:
     fault, here = study.source.fault, f"sensor.{name}"
     if sensor.reads.of_support:
         raise fault(f"{here}.quantity", "supports of bodies in frames that move are not read", expected="displacement")
-    if sensor.spot is not None or sensor.carriage is not None:
+    if sensor.carriage is not None:
+        _refuse_of_carriage(study, here, sensor.quantity, sensor.carriage, OF_CARRIAGE)
+    if sensor.spot is not None:
         raise fault(here, "this place is not read in frames that move", expected="at, or under")
     if sensor.frequency_limit is not None:
         raise fault(f"{here}.frequency_limit", "sensors in frames that move read all modes", expected="no such key")
     if sensor.under is not None and sensor.quantity != "displacement":
-        what = "under a carriage only the displacement is read here"
-        raise fault(f"{here}.quantity", what, expected="displacement")
+        _refuse_of_carriage(study, here, sensor.quantity, sensor.under, UNDER_CARRIAGE)
+
+
+def _refuse_of_carriage(study: Study, here: str, quantity: str, carriage: str, known: Mapping[str, str]) -> None:
+    """What a sensor does not read of a carriage: either the archive has it of every carriage, or nobody tells it."""
+    what = "of a carriage in frames that move only the displacement under it is read here"
+    expected, remedy = f'quantity = "displacement" and under = "{carriage}"', "other quantities at a place of its track"
+    if quantity in known:
+        found = f"{carriage}_{known[quantity]}"
+        what = (
+            f"in frames that move the archive has the {quantity.replace('_', ' ')} of every carriage without a sensor"
+        )
+        expected, remedy = "no such sensor", f"{found}_max, {found}_min and the history {found} in the archive"
+    raise study.source.fault(f"{here}.quantity", what, expected=expected, received=quantity, remedy=remedy)
 
 
 def refuse_model(model: FloatingModel) -> None:

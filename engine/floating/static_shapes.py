@@ -9,6 +9,7 @@ are 1.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 from math import factorial
 from typing import TYPE_CHECKING, NamedTuple
@@ -108,11 +109,13 @@ def deflections(order: int, ends: tuple[str, str], places: Sequence[float]) -> D
 @dataclass(frozen=True, eq=False)
 class WithStatics:
     """Modes of a part and, after them, what they leave of static deflections of a beam of a length (m): these less
-    their parts ``on_modes`` (N, A) along the modes, mixed (A, B) so that they are orthogonal to each other."""
+    their parts ``on_modes`` (N, A) along the modes, mixed (A, B) so that they are orthogonal to each other. held: the
+    derivatives that vanish where the beam begins."""
 
     part: Part
     length: float
     statics: Deflections
+    held: tuple[int, ...]
     on_modes: Array
     mixed: Array
     omega: Array
@@ -131,11 +134,25 @@ class WithStatics:
 
     def derivatives(self, x: Array, orders: Sequence[int]) -> dict[int, Array]:
         modes = self.part.derivatives(x, orders)
-        return {order: self._both(modes[order], x / self.length, order, self.length**order) for order in orders}
+        found = {}
+        for order in orders:
+            left = self._left(modes[order], x, order)
+            for k in self.held:
+                if k >= order:
+                    left -= _power(x, k - order)[:, None] * self._at_beginning[k]
+            found[order] = np.concatenate([modes[order], left @ self.mixed], axis=1)
+        return found
 
-    def _both(self, modes: Array, x: Array, order: int, scale: float) -> Array:
-        left = self.statics.derivatives(x, order) / scale - modes @ self.on_modes
-        return np.concatenate([modes, left @ self.mixed], axis=1)
+    def _left(self, modes: Array, x: Array, order: int) -> Array:
+        """(S, A) what modes (S, N) leave of the deflections at places (m); many modes leave little more than
+        rounding."""
+        return self.statics.derivatives(x / self.length, order) / self.length**order - modes @ self.on_modes
+
+    @cached_property
+    def _at_beginning(self) -> dict[int, Array]:
+        """(1, A) by derivative, of those that vanish there: rounding, which would be told as a motion of the joint."""
+        modes, start = self.part.derivatives(np.zeros(1), self.held), np.zeros(1)
+        return {order: self._left(modes[order], start, order) for order in self.held}
 
 
 def with_statics(part: Part, law: Law, places: Sequence[float], s: Array, dm: Array) -> Part:
@@ -155,7 +172,8 @@ def with_statics(part: Part, law: Law, places: Sequence[float], s: Array, dm: Ar
     K = law.stiffness * own - on_modes.T @ (squares * on_modes)
     M = left.T @ (dm[:, None] * left)
     mixed, omega = _principal(K, M, np.diag(M) > NOTHING**2 * dm.sum())
-    return WithStatics(part, law.length, statics, on_modes, mixed, np.concatenate([part.omega, omega]))
+    held = tuple(order for order in VANISH[law.order][law.ends[0]] if order < law.order // 2)
+    return WithStatics(part, law.length, statics, held, on_modes, mixed, np.concatenate([part.omega, omega]))
 
 
 def _without_rigid(statics: Deflections, motions: Array, x: Array, dm: Array) -> Deflections:

@@ -1,4 +1,4 @@
-"""Where the theory ends: bodies that turn fast without getting stiffer by it, and bodies that bend far."""
+"""Where the theory ends: bodies that turn fast without getting stiffer by it, that bend far, and ends of tracks."""
 
 from __future__ import annotations
 
@@ -59,6 +59,31 @@ def rates_at(pieces: Array, times: Array) -> Array:
     powers = sum(k * own[:, :, CONSTANT + k] * x ** (k - 1) for k in range(1, AMPLITUDE - CONSTANT))
     rate = own[:, :, RATE]
     return np.asarray(powers + own[:, :, AMPLITUDE] * rate * np.cos(rate * x + own[:, :, PHASE]))
+
+
+def given_way(model: FloatingModel, values: VariantValues, duration: Array, carriage: str) -> tuple[Array, Array]:
+    """(V,) twice, m: the least and the largest place of a carriage with a given motion within a duration (V,) s."""
+    number = model.motions.index(f"carriage.{carriage}.motion")
+    pieces = lanes(model, values, np.ones(values.size)).motions[:, number]
+    times = np.linspace(np.zeros(values.size), duration, RATES, axis=1)
+    found = places_at(pieces, np.concatenate([times, np.minimum(pieces[:, :, START], duration[:, None])], axis=1))
+    return found.min(axis=1), found.max(axis=1)
+
+
+def ends_of_motions(model: FloatingModel, values: VariantValues) -> dict[str, Array]:
+    """(V,) s, when each given motion, and each course of a load, comes to its last piece; by dotted key."""
+    starts = lanes(model, values, np.ones(values.size)).motions[:, :, :, START]
+    ends = np.where(np.isfinite(starts), starts, 0.0).max(axis=2, initial=0.0)
+    return {key: ends[:, m] for m, key in enumerate(model.motions)}
+
+
+def places_at(pieces: Array, times: Array) -> Array:
+    """(V, T) values of motions in pieces (V, pieces, 10) at times (V, T) s."""
+    number = (pieces[:, None, :, START] <= times[:, :, None]).sum(axis=2) - 1
+    own = np.take_along_axis(pieces, number[:, :, None], axis=1)
+    x = times - own[:, :, START]
+    powers = sum(own[:, :, CONSTANT + k] * x**k for k in range(AMPLITUDE - CONSTANT))
+    return np.asarray(powers + own[:, :, AMPLITUDE] * np.sin(own[:, :, RATE] * x + own[:, :, PHASE]))
 
 
 def unstiffened_times(model: FloatingModel, marched: Marched) -> Array:

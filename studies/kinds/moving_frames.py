@@ -77,15 +77,15 @@ class MovingFrames(PiecedKind):
         return foreseen(study, _duration(study), threads, audited)
 
     def remarks(self, study: Study) -> Sequence[str]:
-        from studies.moving.parts import remarks
+        from studies.moving.remarks import remarks
 
-        return tuple(remarks(study, question_of(study, Question).duration))
+        return remarks(study, _duration(study))
 
     def gather(self, pieces: Mapping[str, xr.Dataset], study: Study) -> xr.Dataset:
         return gather(pieces, study, self.name)
 
     def findings(self, results: Results) -> list[str]:
-        return findings.answer(results)
+        return findings.answer(results, question_of(results.study, Question).duration)
 
 
 KIND = MovingFrames()

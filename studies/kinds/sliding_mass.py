@@ -4,9 +4,10 @@ import numpy as np
 
 from engine.scene.study import Study
 from results_schema.variables import declare
-from studies.kinds.moving_frames import MovingFrames
+from studies.kinds.moving_frames import MovingFrames, Question
 from studies.moving import findings
 from studies.moving.variables import RESULTS
+from studies.protocol.study import question_of
 from studies.results.formatting import quantity
 from studies.results.results import Results
 
@@ -31,7 +32,8 @@ class SlidingMass(MovingFrames):
             raise study.source.fault("carriage", "one carriage slides here", expected=expected)
 
     def findings(self, results: Results) -> list[str]:
-        return [*findings.sliding(results), *_beside_the_paper(results), *findings.others(results)]
+        seconds = question_of(results.study, Question).duration
+        return [*findings.sliding(results), *_beside_the_paper(results), *findings.others(results, seconds)]
 
 
 KIND = SlidingMass()

@@ -15,15 +15,17 @@ from studies.results.places import extreme
 from studies.results.results import Results
 
 MOST_SENSORS = 4
+EARLIER = 1.0 - 1e-9  # times a duration: more is rounding
 
 
-def answer(results: Results) -> list[str]:
-    """Carriages that slide, sensors, ends of tracks, statuses."""
-    return [*sliding(results), *others(results)]
+def answer(results: Results, seconds: float) -> list[str]:
+    """Carriages that slide, sensors, ends of tracks, statuses; seconds: that a march takes."""
+    return [*sliding(results), *others(results, seconds)]
 
 
-def others(results: Results) -> Iterator[str]:
+def others(results: Results, seconds: float) -> Iterator[str]:
     """All but carriages that slide."""
+    yield from _ended(results, seconds)
     yield from _sensors(results)
     yield from _driven(results)
     yield from _ends(results)
@@ -56,6 +58,17 @@ def sliding(results: Results) -> Iterator[str]:
         if index is not None:
             span = _span(dataset[f"{name}_contact_force_min"].values, force.values, "N")
             yield f"Its contact force goes from {span}, the largest{in_words(results, index)}."
+
+
+def _ended(results: Results, seconds: float) -> Iterator[str]:
+    """Marches that end before their time, as nothing else ends them that has values."""
+    duration = results.dataset["duration"]
+    early = duration.where(duration < EARLIER * seconds)
+    place = extreme(early, np.nanargmin)
+    if place is not None:
+        of = f" in {counted(int(early.count()), 'variant')} of {results.size:,}" if results.size > 1 else ""
+        first = f"{quantity(float(early.values[place]), 's')}{in_words(results, place)}"
+        yield f"A carriage goes over an end of its track{of}, soonest after {first}: there the march ends."
 
 
 def _sensors(results: Results) -> Iterator[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from results_schema.arrays import Array, Counts
 from results_schema.errors import BadInput
+from studies.moving.ways import refuse_ways
 from studies.protocol.converged import HISTORY, Told, labelled
 from studies.protocol.parts import Piece, Work, unlabelled
-from studies.results.formatting import percent, quantity
 from studies.results.places import spread
 
 if TYPE_CHECKING:
@@ -31,7 +31,6 @@ STEP_SECONDS, COORDINATE_SECONDS = 5e-7, 3e-7  # of a step, and for each coordin
 LEVELS_TAKEN = 3.0  # times the coarsest level: two levels
 AUDIT_SECONDS = 4.0  # of an audited variant over one of a run: a level beyond, in lanes of which most stand empty
 NEWTON_STEPS = 4  # from a straight line, for roots to rounding
-LOOKED_AT = 32  # scenes, and variants of each, for what is said beforehand
 BLOCKS = 4  # of lanes in one job at most: those that need more steps fill the lanes anew
 COMPONENTS, QUATERNION = ("x", "y", "z"), ("w", "x", "y", "z")
 
@@ -72,7 +71,9 @@ def pieces(study: Study, duration: Callable[[Mapping[str, Array], int], Array]) 
     model = build(study.without_sweep(), 2)
     check_memory(study, cases.size, 8 * cases.size * (len(results_names(model)) + 40))
     found: list[Piece] = []
-    for scene in scenes(study, cases):
+    together = scenes(study, cases)
+    refuse_ways(study, cases, together, duration)
+    for scene in together:
         longest = float(duration(cases.columns_of(scene.variants), scene.variants.size).max())
         coarsest = next(iter(levels(scene.study, longest, FIRST_MODES)), None)
         if coarsest is None:
@@ -108,29 +109,6 @@ def _check_steps(study: Study) -> None:
         if STEPS in axis.of:
             what, remedy = "variants of frames that move share their steps", "a study for each number of steps"
             raise study.source.fault(f"sweep.{name}.of", what, received=STEPS, remedy=remedy)
-
-
-def remarks(study: Study, duration: float) -> Iterator[str]:
-    """Bodies that given motions alone turn beyond the theory, with the largest rate among some of the variants."""
-    from engine.floating.model import build
-    from engine.floating.theory import MISSING, given_rates, lacking
-    from engine.scene.sweep import expand
-    from engine.scene.variants import VariantValues
-
-    cases = expand(study)
-    worst: dict[str, tuple[float, float]] = {}
-    for scene in scenes(study, cases)[:LOOKED_AT]:
-        model, own = build(scene.study, 2), scene.variants[spread(scene.variants.size, LOOKED_AT)]
-        rates = given_rates(model, VariantValues(scene.study, cases.columns_of(own), own.size), duration)
-        for name, body in model.bodies.items():
-            rate = float(rates[name].max())
-            worst[name] = max(worst.get(name, (0.0, 0.0)), (lacking(body) * rate**2, rate))
-    for name, (missing, rate) in worst.items():
-        if missing > MISSING:
-            yield (
-                f"{name} is turned with up to {quantity(rate, 'rad s-1')}, at which it lacks {percent(missing)} of its "
-                f"stiffness, as frame.{name}.stiffening is off: such variants are beyond the theory, or diverge"
-            )
 
 
 def results_names(model: FloatingModel) -> list[str]:

@@ -25,6 +25,7 @@ MEANT = {
 } | {f"acceleration_{axis}": TOUCHED for axis in "xyz"}
 WORD_OF = {"max": "largest", "min": "smallest"}
 AT_STATIONS, BETWEEN = "over all stations", "over all stations and, by parabolas, between them"
+SLIDING = "over all stations and, where it slides by itself, by parabolas between them"
 OF_STOPS = (
     "of a position error, from then on where all joints that carry it have come to their ends; NaN where that is not "
     "within the time"
@@ -43,7 +44,7 @@ def _ends(name: str, units: str, words: str, meaning: str) -> list[Variable]:
 
 
 def _history(name: str, dims: tuple[str, ...], units: str, words: str, meant: str = "") -> Variable:
-    gone = "NaN from the moment on at which a carriage has slid over an end of its track"
+    gone = "NaN from the moment on at which a carriage is over an end of its track"
     return Variable(
         name,
         ("station", *dims),
@@ -62,7 +63,7 @@ def _of_carriages() -> list[Variable]:
         units = UNITS.get(end, "m s-2")
         words = f"{WORDS[end]} of {{carriage}}"
         meant = MEANT.get(end, "")
-        where = "; ".join(text for text in (meant, BETWEEN if end == "position" else AT_STATIONS) if text)
+        where = "; ".join(text for text in (meant, SLIDING if end == "position" else AT_STATIONS) if text)
         name = f"{{carriage}}_{end}"
         found += [*_ends(name, units, words, where), _history(name, (), units, words, meant)]
     return [
@@ -115,7 +116,7 @@ RESULTS = (
         meaning="kinetic, elastic, of springs and height; by damping, friction and what is driven, else by the steps",
     ),
     Variable(
-        "duration", units="s", long_name="time that was marched", meaning="less where a carriage slid over an end"
+        "duration", units="s", long_name="time that was marched", meaning="less where a carriage went over an end"
     ),
     *(
         Variable(

@@ -76,7 +76,7 @@ def test_check_says_so_before_anything_is_marched() -> None:
     assert lacks == pytest.approx(3.0, rel=0.02)
     assert "up to 6 rad/s" in said and "lacks 300 % of its stiffness" in said
     assert KIND.remarks(spin_up(20.0, {"stiffening": True})) == ()
-    assert KIND.remarks(spin_up(2.0, {})) == ()  # it has hardly begun to turn
+    assert not any("lacks" in said for said in KIND.remarks(spin_up(2.0, {})))  # it has hardly begun to turn
     hub = {"kind": "rigid", "length": 1.0, "mass": 1.0, "inertia": 1.0}
     frames = {"hub": {"joints": [SPIN_UP]}, "arm": {"on": "hub"}}
     (said,) = KIND.remarks(spin_up(20.0, {}, body={"hub": hub, "arm": ARM}, frame=frames))

@@ -160,6 +160,7 @@ PRISMATIC = {"kind": "prismatic", "axis": [0, 1, 0]}
 STEADY = {"kind": "steady", "rate": "1 deg/s"}
 TOP = {"position": [0, 0, 1]}
 SENSOR = {"body": "beam", "at": 0.0}
+PUSH = {"carriage": "load", "quantity": "contact_force"}
 
 
 @pytest.mark.parametrize(
@@ -190,6 +191,8 @@ SENSOR = {"body": "beam", "at": 0.0}
         ({"spring": {"s": {"ends": [{"on": "that"}, TOP], "length": 1.0}}}, "no such body"),
         ({"frame": {"beam": {"lateral_modes": 2}}}, "lateral_second_moment"),
         ({"sensor": {"under": {"under": "load", "quantity": "velocity"}}}, "only the displacement"),
+        ({"sensor": {"push": PUSH}}, r"without a sensor; .*remedy: load_contact_force_max, load_contact_force_min and"),
+        ({"sensor": {"under": {"under": "load", "quantity": "acceleration"}}}, "the history load_acceleration_z in"),
         ({"sensor": {"low": SENSOR | {"quantity": "velocity", "frequency_limit": 3.0}}}, "read all modes"),
         ({"sensor": {"foot": SENSOR | {"quantity": "support_reaction"}}}, "supports of bodies in frames that move"),
     ],

@@ -12,7 +12,7 @@ from engine.kernels.layout import BoolArray, FloatArray, IntArray
 
 #: Kinds of joints. A spherical joint has three coordinates, a rotation vector within each step.
 REVOLUTE, PRISMATIC, SPHERICAL = 0, 1, 2
-#: What happened to a lane: the last, a carriage slid over an end of its track, where the lane's march ends.
+#: What happened to a lane: the last, a carriage went over an end of its track, where the lane's march ends.
 SOUND, NOT_CONVERGED, DIVERGED, OVER_THE_END = 0, 1, 2, 3
 #: Rows of the statistics of a signal.
 LARGEST, LARGEST_AT, SMALLEST, SMALLEST_AT, SQUARES, STATISTICS = 0, 1, 2, 3, 4, 5

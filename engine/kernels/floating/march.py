@@ -21,6 +21,7 @@ from engine.kernels.floating.layout import (
     NOT_CONVERGED,
     OVER_THE_END,
     PLACE_COORDINATE,
+    PLACE_MOTION,
     RIDDEN,
     SMALLEST,
     SMALLEST_AT,
@@ -60,6 +61,7 @@ KEPT = 8
 MOST_BENT = 10.0  # lengths of a body: beyond, a march has diverged, whatever is wrong
 NEAR = 1e-9  # of a step: an event so near to a station falls on it
 JUMP = 1e-12  # of a rate: below it is rounding
+OFF = 1e-9  # of a length: less over an end of a track is rounding of a given motion
 
 
 class Room(NamedTuple):
@@ -242,7 +244,7 @@ def march_block(system, lane, scheme, steps, block, room, record):
                 put_lanes(record.history, (block, kept, k), choose(goes, lanes_at(signals, (k,)), np.nan))
             kept += 1
         turn_bases(system.joint_table, work.base, state.now.y)
-        check(system, state.now.y, memory)
+        check(system, state.now.y, work.motions, memory)
     for j in range(LANES):
         record.codes[block, j] = int(memory[CODE, j])
 
@@ -256,13 +258,16 @@ def note_last(memory, number, block, last):
 
 
 @called
-def check(system, y, memory):
-    """Whether a carriage of a lane has slid over an end of its track, or a body bends by many times its length."""
+def check(system, y, motions, memory):
+    """Whether a carriage of a lane is over an end of its track, or a body bends by many times its length."""
     for c in range(system.riders.shape[0]):
-        k = system.riders[c, PLACE_COORDINATE]
+        k, length = system.riders[c, PLACE_COORDINATE], system.bodies[system.riders[c, RIDDEN], LENGTH]
         if k >= 0:
-            s, length = lanes_at(y, (k,)), system.bodies[system.riders[c, RIDDEN], LENGTH]
-            put_where(sound(memory) & ((s < 0.0) | (s > length)), memory, (CODE,), all_lanes(1.0 * OVER_THE_END))
+            s, near = lanes_at(y, (k,)), 0.0
+        else:  # what is given may come to an end by rounding
+            s, near = lanes_at(motions, (system.riders[c, PLACE_MOTION], 0)), OFF * length
+        off = (s < -near) | (s > length + near)
+        put_where(sound(memory) & off, memory, (CODE,), all_lanes(1.0 * OVER_THE_END))
     for b in range(system.tree.shape[0]):
         most = MOST_BENT * system.bodies[b, LENGTH] * np.sqrt(system.bodies[b, MASS])  # modal masses are 1
         for k in range(system.tree[b, FIRST], system.tree[b, FIRST] + system.tree[b, MODES]):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import studies
-from engine.scene.study import load
+from engine.scene.study import Study, load
 from results_schema.errors import BadInput
 
 BEAD = """
@@ -51,3 +51,27 @@ def test_where_finer_models_give_up_no_estimate_exists() -> None:
     found = studies.run(load(BEAD))
     assert not np.isinf(found["estimated_error"]).any() and not np.isinf(found["error_estimate"])
     assert float(found["bead_contact_force_max"]) == pytest.approx(14.93, rel=2e-3)
+
+
+def test_a_first_march_that_failed_tells_no_error() -> None:
+    """On a soft joint modes are faster than those of the beam alone: Fox-Goodwin's first steps are beyond its limit,
+    and the contact force, right to 1e-4, was told to be off by 20 times itself."""
+    tables = load(BEAD).data
+    beam = tables["body"]["beam"] | {"length": 10.0, "area": 4e-3, "second_moment": 2e-6, "youngs_modulus": "70 GPa"}
+    joint = {"kind": "revolute", "axis": [0, 1, 0], "stiffness": 1e6, "damping": 1e3}
+    way = {"kind": "waypoints", "times": [0, 1, 2.5], "positions": [0, 4, 8]}
+    given = Study(
+        **tables
+        | {
+            "body": {"beam": beam | {"density": 3000.0, "modes": 4}},
+            "frame": {"beam": {"joints": [joint]}},
+            "carriage": {"bead": {"on": "beam", "kind": "mass", "mass": 20.0, "motion": way}},
+            "sensor": {},
+            "question": {"duration": 3.0},
+        }
+    )
+    found, finer = studies.run(given), studies.run(given.with_values({"solver.steps": 12800}))
+    force = "bead_contact_force_max"
+    told = float(found["estimated_error"].sel(result=force))
+    assert float(found[force]) == pytest.approx(float(finer[force]), rel=1e-3)
+    assert told < 0.5  # by four modes, of the whole history
