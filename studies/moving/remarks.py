@@ -26,6 +26,7 @@ LOOKED_AT = 32  # scenes, and variants of each
 LONGER = 1.0 + 1e-9  # times a duration: less is rounding
 PLACES = 17  # of a track, at which the largest of a reading is looked for
 ROUNDING = 1e-9  # of that: less is rounding
+Y, Z = 1, 2
 TURN = np.pi  # rad: joints seldom turn further, and not by whole numbers of radians
 
 
@@ -192,7 +193,7 @@ def _nothing_across(looked: Looked) -> Iterator[str]:
 
 def _stays_in_plane(model: FloatingModel, name: str) -> bool:
     """Whether a body keeps the y axis of what it hangs on, and does not bend along it, nor twist."""
-    from engine.floating.elastic import ABOUT_X, ABOUT_Z, Y
+    from engine.floating.elastic import ABOUT_X, ABOUT_Z
     from engine.kernels.floating.layout import PRISMATIC, REVOLUTE
 
     body, turned = model.bodies[name], np.array(model.frame(name).turned)
@@ -204,6 +205,38 @@ def _stays_in_plane(model: FloatingModel, name: str) -> bool:
     return bool(kept and flat and not np.delete(turned, Y).any())
 
 
+def _let_go(looked: Looked) -> Iterator[str]:
+    """Bodies that lie across gravity and could rest on their joints."""
+    study, model = looked.study, looked.samples[0].model
+    joints = [joint for frame in study.frame.values() for joint in frame.joints]
+    rests = all(joint.is_held and not joint.told_start for joint in joints)
+    if study.start != "rest" or not rests or any(carriage.motion.slides for carriage in study.carriage.values()):
+        return
+    down = {name: E.T[:, Z] for name, E in _attitudes(model).items() if model.bodies[name].omega.size}
+    across = [name for name, way in down.items() if study.gravity * np.hypot(way[Y], way[Z]) > ROUNDING * study.gravity]
+    if across:
+        yield (
+            f"{' and '.join(across)} {'starts' if len(across) == 1 else 'start'} undeformed, so that weight sets "
+            f'{"it" if len(across) == 1 else "them"} swinging at time 0; initial = "equilibrium" starts from where '
+            f"{'it rests' if len(across) == 1 else 'they rest'}"
+        )
+
+
+def _attitudes(model: FloatingModel) -> dict[str, Array]:
+    """(3, 3) of every frame over the ground at time 0, as of bodies that do not bend."""
+    from scipy.spatial.transform import Rotation
+
+    found: dict[str, Array] = {}
+    for name in model.bodies:
+        frame = model.frame(name)
+        turns = [frame.turned, *(joint.at_start[0] for joint in frame.joints)]
+        own = found.get(frame.on, np.eye(3))
+        for turn in turns:
+            own = own @ Rotation.from_rotvec(turn).as_matrix()
+        found[name] = own
+    return found
+
+
 def _doubtful(looked: Looked) -> Iterator[str]:
     from engine.batch.plausibility import doubtful, half_united
 
@@ -212,4 +245,6 @@ def _doubtful(looked: Looked) -> Iterator[str]:
 
 
 REMARKS: tuple[Callable[[Looked], Iterator[str]], ...]
-REMARKS = (_doubtful, _degrees, _turned_fast, _over_an_end, _goes_on, _stands, _reads_nothing, _nothing_across)
+REMARKS = (
+    _doubtful, _degrees, _turned_fast, _over_an_end, _goes_on, _stands, _reads_nothing, _nothing_across, _let_go,
+)  # fmt: skip

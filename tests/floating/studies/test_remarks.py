@@ -28,6 +28,11 @@ def with_tool(**more: Any) -> Study:
     return driven(body=bodies, **more)
 
 
+def heavy(**more: Any) -> Study:
+    """The arm under gravity."""
+    return driven(arm={"own_weight": True}, gravity=9.81, **more)
+
+
 SAID = {
     'body.arm.youngs_modulus = 70 Pa: no beam has this, expected 1e5 to 2e12 Pa, steel 2.1e11; did you mean "70 GPa"': (
         driven(arm={"youngs_modulus": 70.0})
@@ -50,6 +55,7 @@ SAID = {
     "sensor side reads 0: nothing that carries it moves or bends along y over the ground: lateral_modes of frame.arm": (
         driven(sensor={"side": ASIDE})
     ),
+    'arm starts undeformed, so that weight sets it swinging at time 0; initial = "equilibrium"': heavy(),
     "sensor low reads 0: its body has no bending moment there, as at a support or a free end": driven(
         sensor={"low": {"body": "arm", "at": 10.0, "quantity": "bending_moment"}}
     ),
@@ -74,4 +80,6 @@ def test_nothing_is_remarked_of_ordinary_studies() -> None:
     assert KIND.remarks(driven(sensor={"side": ASIDE}, frame={"arm": bends})) == ()
     about_z = TURN | {"axis": [0, 0.1, 1]}
     assert KIND.remarks(driven(sensor={"side": ASIDE}, joints=[about_z, TURN])) == ()
-    assert len(REMARKS) == 8
+    assert KIND.remarks(heavy(initial="equilibrium")) == ()
+    assert KIND.remarks(heavy(frame={"arm": {"joints": [TURN], "turned": [0, "90 deg", 0]}})) == ()  # upright
+    assert len(REMARKS) == 9
