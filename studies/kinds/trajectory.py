@@ -1,5 +1,7 @@
 """What happens when? Histories of every sensor and of the carriages' own motion."""
 
+from functools import partial
+
 import numpy as np
 
 from engine.scene.study import Study
@@ -9,7 +11,7 @@ from studies.findings.beyond import of_every_quantity
 from studies.findings.residual import AskedOfRest, check_residual, most_ringing, residuals
 from studies.protocol.study import Kind, question_of
 from studies.results.findings_common import check_sensors, first_carriage, told_statuses, uncertainty
-from studies.results.formatting import counted, quantity
+from studies.results.formatting import counted, quantity, spanned
 from studies.results.places import Index
 from studies.results.results import Results
 
@@ -68,13 +70,13 @@ KIND = Trajectory()
 def _kept(results: Results) -> str:
     """How many histories there are, how long and how fine."""
     traced = results.traced()
-    trace = results.trace(next(iter(results.sensors)), traced[0])
-    points = int(np.isfinite(trace.values).sum())
-    ends = [results.trace(next(iter(results.sensors)), index).end for index in traced]
-    spans = " to ".join(dict.fromkeys(quantity(end, "s") for end in (min(ends), max(ends))))
+    traces = [results.trace(next(iter(results.sensors)), index) for index in traced]
+    points = [int(np.isfinite(trace.values).sum()) for trace in traces]
+    spans = spanned((trace.end for trace in traces), partial(quantity, units="s"))
+    fewest = "" if min(points) == max(points) else f"{min(points):,} to "
     return (
         f"Histories of {counted(len(traced), 'variant')} out of {results.size:,}, each over {spans} "
-        f"on {counted(points, 'station')}."
+        f"on {fewest}{counted(max(points), 'station')}."
     )
 
 
