@@ -10,7 +10,7 @@ from results_schema.variables import MARCH, declare
 from studies.findings.beyond import of_every_quantity
 from studies.findings.residual import AskedOfRest, check_residual, most_ringing, residuals
 from studies.protocol.study import Kind, question_of
-from studies.results.findings_common import check_sensors, first_carriage, told_statuses, uncertainty
+from studies.results.findings_common import check_sensors, first_carriage, over_all, told_statuses, uncertainty
 from studies.results.formatting import counted, quantity, spanned
 from studies.results.places import Index
 from studies.results.results import Results
@@ -86,11 +86,10 @@ def _span(results: Results, sensor: str) -> str:
     low, high = (results.dataset[f"{sensor}_{side}"].values for side in ("min", "max"))
     if np.isnan(low).all():
         return f"{sensor}: no variant has values."
-    over = " over all variants" if results.size > 1 else ""
     ends = float(np.nanmin(low)), float(np.nanmax(high))
     span = " to ".join(quantity(end, units, beside=max(map(abs, ends))) for end in ends)
     places = (results.index_of(int(flat)) for flat in (np.nanargmin(low), np.nanargmax(high)))
     named = zip((f"{sensor}_min", f"{sensor}_max"), places, strict=True)
     looser = max(named, key=lambda end: np.nan_to_num(results.error_at(*end)))
     what = f"{results.noun(sensor)} {results.place(sensor)}"
-    return f"{sensor}: the {what} goes from {span}{over}{uncertainty(results, *looser)}."
+    return f"{sensor}: the {what} goes from {span}{over_all(results)}{uncertainty(results, *looser)}."

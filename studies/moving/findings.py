@@ -9,7 +9,7 @@ from studies.findings.absolute_errors import errors_of_size
 from studies.findings.amplification import sizes
 from studies.findings.beyond import limits_of, ranked, told_limit
 from studies.findings.effects import by_effect
-from studies.results.findings_common import in_words, told_statuses, uncertainty, while_held
+from studies.results.findings_common import in_words, over_all, told_statuses, uncertainty, while_held
 from studies.results.formatting import counted, quantity
 from studies.results.places import extreme
 from studies.results.results import Results
@@ -43,10 +43,9 @@ def sliding(results: Results) -> Iterator[str]:
     for name, carriage in results.study.carriage.items():
         if not carriage.motion.slides or np.isnan(dataset[f"{name}_position_max"].values).all():
             continue
-        over = " over all variants" if results.size > 1 else ""
         way = _span(dataset[f"{name}_position_min"].values, dataset[f"{name}_position_max"].values, "m")
         swings = dataset[f"{name}_period"].values
-        said = f"{name} slides from {way}{over}"
+        said = f"{name} slides from {way}{over_all(results)}"
         if np.isfinite(swings).any():
             many = results.size > 1
             said += f", with a period of {_span(swings, swings, 's') if many else quantity(float(swings), 's', 4)}"

@@ -119,4 +119,7 @@ def test_histories_of_different_stations_are_told_as_such() -> None:
     count = dataset.sizes["station"]
     assert f"on {count:,} stations." in "\n".join(studies.answer(dataset))
     dataset["midspan"].values[1, 100:] = np.nan
-    assert f"on 100 to {count:,} stations." in "\n".join(studies.answer(dataset))
+    assert f"on 100 to {count:,} stations." in (said := "\n".join(studies.answer(dataset)))
+    assert said.count(" over all variants") == 2
+    some = scenes.with_failures(dataset, 2)
+    assert "\n".join(studies.answer(some)).count(" over 1 variant with values") == 2
