@@ -36,6 +36,9 @@ declare(
             its number in the cycle
         mode | | | axis int64 | mode
             its number, from 1
+        body_mode | | | axis int64 | mode of the body
+            its number, from 1
+        track_position | | m | axis | place along the track
         sample | | | axis int64 | variant
             flat number of one that was run again
         scheme | | | axis str | time integration scheme
@@ -149,9 +152,10 @@ declare(
 declare(
     "/model",
     *outputs("""
-        frequency | mode | Hz | alone | natural frequency of the body
-        damping_ratio | mode | | optional alone | damping ratio of the mode
-        mode_shape | mode position | kg-0.5 | optional alone | mode shape on the track
+        frequency | body_mode/mode | Hz | alone | natural frequency of the body
+            over `mode` in older archives
+        damping_ratio | body_mode/mode | | optional alone | damping ratio of the mode
+        mode_shape | body_mode/mode track_position/position | kg-0.5 | optional alone | mode shape on the track
             unit modal mass
         length | | m | alone | length of the track
         mass | | kg | alone | mass of the body

@@ -37,6 +37,7 @@ _RESERVED_WORDS = """
     tool_centre_point_error robot component sensor_unit diverged_step harmonic_number frequency_ratio
     tolerance_asked worst_result left_out scheme_used result_unit swept swept_unit status_name status_count percent
     smallest smallest_error smallest_variant smallest_at largest largest_error largest_variant largest_at percentile
+    body_mode track_position
 """
 _NONE: Mapping[str, str] = MappingProxyType({})
 # Names of results, not usable for a sweep's axis, a sensor or a carriage.

@@ -73,17 +73,17 @@ def model_groups(model: SceneModel) -> dict[str, xr.Dataset]:
         rates = values.damping_rates(part.name, omega)[:, 0]
         ratio = np.divide(rates, 2.0 * omega, out=np.full_like(omega, np.nan), where=omega > 0.0)
         arrays = {
-            "frequency": ("mode", omega / (2.0 * np.pi)),
-            "damping_ratio": ("mode", np.where(omega > 0.0, ratio, 0.0)),
-            "mode_shape": (("mode", "position"), part.modal.shape(x).T),
+            "frequency": ("body_mode", omega / (2.0 * np.pi)),
+            "damping_ratio": ("body_mode", np.where(omega > 0.0, ratio, 0.0)),
+            "mode_shape": (("body_mode", "track_position"), part.modal.shape(x).T),
             "length": ((), part.modal.length),
             "mass": ((), part.modal.mass),
         }
         found[f"/model/{part.name}"] = xr.Dataset(
             {name: (dims, array, declared[name].attributes()) for name, (dims, array) in arrays.items()},
             coords={
-                "mode": ("mode", np.arange(1, omega.size + 1), axes()["mode"].attributes()),
-                "position": ("position", x, axes()["position"].attributes()),
+                "body_mode": ("body_mode", np.arange(1, omega.size + 1), axes()["body_mode"].attributes()),
+                "track_position": ("track_position", x, axes()["track_position"].attributes()),
             },
         )
     return found

@@ -123,7 +123,7 @@ def show_outcome(outcome: Outcome) -> None:
     heading(outcome.results.attrs["title"])
     paragraphs(*answer_of(results))
     if not summary.is_measured(outcome.results):  # the grid of those that measure is of methods: its ends say nothing
-        _ranges(summary.in_tables(results), results.percentiles)
+        _ranges(summary.in_tables(results), results.percentiles, summary.every(results))
         _percentiles(results, [_name(one) for one in summary.in_tables(results)][:MOST_ROWS])
     accuracy = told_accuracy(outcome.audit, results)
     paragraphs(*_about_statuses(results), *([f"Accuracy: {accuracy}"] if accuracy else []))
@@ -146,8 +146,11 @@ def show_details(outcome: Outcome) -> None:
     paragraphs(*told_choices(results), *told_audit(outcome.audit, results))
 
 
-def _ranges(found: Sequence[Range], percentiles: Sequence[float]) -> None:
-    """Each result with its range, and where the end is that tells most; in a sentence those that do not change."""
+def _ranges(found: Sequence[Range], percentiles: Sequence[float], every: str) -> None:
+    """Each result with its range, and where the end is that tells most; in a sentence those that do not change.
+
+    every: those over which they do not, in words.
+    """
     blank()
     if not any(one.extreme.words for one in found):
         table("", ("result", "value"), [(_name(one), one.said(one.extreme)) for one in found])
@@ -170,7 +173,7 @@ def _ranges(found: Sequence[Range], percentiles: Sequence[float]) -> None:
     same = [words for one, words in alike if not one.partly]
     if same:
         more = f" and {len(same) - MOST_ALIKE} more" if len(same) > MOST_ALIKE else ""
-        paragraphs(f"The same in every variant: {', '.join(same[:MOST_ALIKE])}{more}.")
+        paragraphs(f"The same in {every}: {', '.join(same[:MOST_ALIKE])}{more}.")
     if some := [f"{words} {one.partly}" for one, words in alike if one.partly]:
         paragraphs(f"The same where there is one: {', '.join(some[:MOST_ALIKE])}.")
     loose = [f"{_name(one)} {one.said(one.extreme)}" for one in found if one.is_loose]

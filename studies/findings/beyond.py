@@ -66,9 +66,17 @@ def told_limit(
     said = where_beyond(results, values, limit, along)
     loose = np.where(error > LOOSE * values, error, 0.0)
     surely, perhaps = (where_beyond(results, values + sign * loose, limit, along) for sign in (-1.0, 1.0))
-    if surely == said == perhaps:
-        return f"{LIMIT}{quantity(limit, units)} {said}."
-    return f"{LIMIT}{quantity(limit, units)} {said}; with its estimated error perhaps {perhaps}, surely {surely}."
+    doubt = "" if surely == said == perhaps else f"; with its estimated error perhaps {perhaps}, surely {surely}"
+    return f"{LIMIT}{quantity(limit, units)} {said}{doubt}{_told_opened(results, values > limit)}."
+
+
+def _told_opened(results: Results, beyond: Mask) -> str:
+    """In how many of the variants that do not count, as their contact opens, a limit is exceeded; "" in none."""
+    opened = results.kept.values & ~results.with_values
+    if not (beyond & opened).any():
+        return ""
+    many = f"{int((beyond & opened).sum()):,} of {counted(int(opened.sum()), 'variant')}"
+    return f"; it does in {many} whose contact opens"
 
 
 def ranked(results: Results, limits: Limits, told: Collection[str] = ()) -> list[str]:
@@ -132,7 +140,7 @@ def _along(results: Results, axis: Axis, beyond: Mask, among: Mask | None = None
     over = np.isin(places, along[beyond])
     if not over.any():
         return f"nowhere from {axis.span}"
-    steps = np.diff(places)
+    steps = _steps(places)
     apart = np.flatnonzero(over[:-1] & over[1:] & (steps > GAP * np.median(steps)))
     if over.all() and not apart.size:
         return f"everywhere from {axis.span}{_common(results, axis, beyond) if among is None else ''}"
@@ -148,6 +156,16 @@ def _along(results: Results, axis: Axis, beyond: Mask, among: Mask | None = None
         return f"{_at(axis, parts, end)}{whole}"
     first, last = (_at(axis, [part], end) for part in (parts[0], parts[-1]))
     return f"in {len(parts)} parts of the sweep, first {first}, last {last}{whole}"
+
+
+def _steps(places: Array) -> Array:
+    """How far ascending values of a sweep are apart: by difference or by ratio, whichever is the more even.
+
+    >>> _steps(np.array([1.0, 2.0, 3.0, 10.0, 11.0])), _steps(np.array([0.1, 1.0, 10.0, 1000.0])) / np.log(10.0)
+    (array([1., 1., 7., 1.]), array([1., 1., 2.]))
+    """
+    ways = [np.diff(places), *([np.diff(np.log(places))] if places[0] > 0.0 else [])]
+    return min(ways, key=lambda steps: float(np.median(np.abs(steps / np.median(steps) - 1.0))) if steps.size else 0.0)
 
 
 def _at(axis: Axis, parts: list[Array], end: float) -> str:
@@ -175,12 +193,18 @@ def _in_one_unit(axis: Axis, parts: list[Array]) -> str:
 
 
 def _common(results: Results, along: Axis, which: Mask) -> str:
-    """What else is swept and has not all of its values among some variants, in brackets; "some of" where not every
-    combination of these with the values of ``along`` is among them."""
-    others = [axis for axis in results.axes if axis.name != along.name]
-    values = [np.unique(results.everywhere(results.dataset[axis.name])[which]) for axis in others]
-    pairs = zip(others, values, strict=True)
-    told = [f"{axis.noun} {replace(axis, values=own).span}" for axis, own in pairs if own.size < axis.values.size]
-    places = np.unique(results.everywhere(results.dataset[along.name])[which])
-    full = np.count_nonzero(which) == places.size * np.prod([own.size for own in values])
-    return f" ({'' if full else 'some of '}{', '.join(told)})" if told else ""
+    """What else is swept and has not all of its values among some variants, in brackets; "some of", or "not with every"
+    where it has all, where not every combination of these with the values of ``along`` is among them."""
+    others = [axis for axis in results.axes if axis.name != along.name and axis.values.size > 1]
+    swept = {axis.name: results.everywhere(results.dataset[axis.name]) for axis in (along, *others)}
+    own = {name: np.unique(values[which]) for name, values in swept.items()}
+    told = [
+        f"{axis.noun} {replace(axis, values=own[axis.name]).span}"
+        for axis in others
+        if own[axis.name].size < np.unique(axis.values).size
+    ]
+    among = np.logical_and.reduce([np.isin(values, own[name]) for name, values in swept.items()])
+    full = not (among & results.with_values & ~which).any()
+    if told:
+        return f" ({'' if full else 'some of '}{', '.join(told)})"
+    return "" if full else f" (not with every {listed([axis.noun for axis in others])})"

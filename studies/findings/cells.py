@@ -3,6 +3,7 @@
 import numpy as np
 
 from results_schema.arrays import Array
+from results_schema.status import Status
 from studies.findings.beyond import LIMIT, limits_of
 from studies.results.axes import Axis
 from studies.results.cells import CellRange, End, cell_ranges, words_of
@@ -46,12 +47,13 @@ def _judged(results: Results, sensor: str, limit: float) -> str:
     sizes = [np.abs(results.dataset[side].sel(result=name).transpose(*results.dims).values) for side, name in ends]
     beyond = np.nan_to_num(np.maximum(*sizes)) > limit
     said = f"{LIMIT}{quantity(limit, results.sensors[sensor])}"
+    opened = "; those whose contact opens count too" if Status.SEPARATED in results.status_counts else ""
     if not beyond.any():
         return f"{said} nowhere."
     if not results.dims:
-        return f"{said} in some of the variants."
+        return f"{said} in some of the variants{opened}."
     many = f"{int(beyond.sum()):,}" if not beyond.all() else "all"
-    return f"{said} in some variants of {many} of {counted(results.size, 'cell')}{_along(results, beyond)}."
+    return f"{said} in some variants of {many} of {counted(results.size, 'cell')}{_along(results, beyond)}{opened}."
 
 
 def _along(results: Results, beyond: Array) -> str:

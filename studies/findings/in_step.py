@@ -14,6 +14,7 @@ from engine.scene.trains import Train
 from results_schema.arrays import Array, Counts
 from results_schema.lazy_imports import xr
 from results_schema.quantities import QUANTITIES
+from studies.findings.theory import along_track
 
 #: Speeds that are looked at between the lowest and the highest, and the part of a train's load that has to push in
 #: step to be told: a bogie of two axles does so far from any resonance of the whole train.
@@ -56,7 +57,7 @@ def speeds_in_step(
     units, newtons = "m s-2" if read else "m", train.load * (1.0 if train.units == "N" else study.gravity)
     seen = read or [one for one in of_body if QUANTITIES[one.quantity].unit == "m"]
     for mode in _modes(body, max((one.frequency_limit or np.inf for one in read), default=np.inf)):
-        own = body.isel(mode=mode)
+        own = body.isel({body["frequency"].dims[0]: mode})
         frequency = float(own["frequency"])
         share = train.in_step(speeds / frequency)
         inside = (share[1:-1] > share[:-2]) & (share[1:-1] >= share[2:]) & (share[1:-1] >= TOLD_IN_STEP)
@@ -75,7 +76,7 @@ def _moved(mode: xr.Dataset, readers: Sequence[Sensor | Envelope]) -> float:
     places = [place for one in readers if (place := one.fixed_place) is not None]
     if not places or len(places) < len(readers):
         return float(shape.max())
-    return float(np.interp(places, mode["position"].values, shape).max())
+    return float(np.interp(places, along_track(mode), shape).max())
 
 
 def _modes(body: xr.Dataset, highest: float) -> Counts:
@@ -90,7 +91,7 @@ def _per_newton(train: Train, mode: xr.Dataset, speeds: Array) -> Array:
     After a force F at a speed v it rings with F omega/v |integral of its shape times exp(i omega x/v) dx|, after a
     train with that of the sum of its forces in step, of which damping leaves the mean over the time in which they come.
     """
-    omega, x, shape = 2.0 * np.pi * float(mode["frequency"]), mode["position"].values, mode["mode_shape"].values
+    omega, x, shape = 2.0 * np.pi * float(mode["frequency"]), along_track(mode), mode["mode_shape"].values
     low, high = np.clip(train.motion.range(), x[0], x[-1])
     crossed, wave = np.linspace(low, high, x.size), omega / speeds
     phi = np.interp(crossed, x, shape)

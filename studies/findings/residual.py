@@ -91,7 +91,7 @@ def _residual(results: Results, sensor: str, limits: Limits) -> str:
     if limit is None:
         return f"{said}{settled}.{between}"
     axis = next(iter(by_effect(results, values)), None)
-    over = f" of {axis.noun}" if axis is not None else ""
+    over = f" of {axis.noun}" if axis is not None and axis.dim != VARIANT else ""
     beyond = f"{quantity(limit, units)} {where_beyond(results, values, limit, axis)}"
     return f"{said}; it exceeds {beyond}{over}{settled}.{between}"
 

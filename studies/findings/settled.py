@@ -133,9 +133,9 @@ def told_unsettled(results: Results) -> list[str]:
     late = (left > held) & (results.dataset["fidelity_used"].values != int(Fidelity.STATIC))
     if not late.any():
         return []
-    most, cycles = float(left[late].max()), float(theory.cycles(results).max())
-    enough = 1.0 + (cycles - 1.0) * np.log(held) / np.log(most) if cycles > 1.0 and most < 1.0 else np.inf
-    known = np.isfinite(enough)
+    most, part, cycles = float(left[late].max()), left[late], theory.cycles(results)[late]
+    known = bool(((cycles > 1.0) & (part < 1.0)).all())
+    enough = float(np.max(1.0 + (cycles - 1.0) * np.log(held) / np.log(part))) if known else np.inf
     advice = f"{np.ceil(enough):,.0f} cycles would be enough" if known else "more cycles, or damping, help"
     told = f"of the start's vibration is left in the last cycle{where_late(results, late)}"
     return [

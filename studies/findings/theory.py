@@ -188,8 +188,13 @@ def elastic_modes(results: Results, places: Array) -> tuple[Array, Array]:
         modal = _model(results, {}).leading_body.modal
         return modal.omega[modal.rigid_modes :], modal.shape(places, 0)[:, modal.rigid_modes :]
     omega = 2.0 * np.pi * recorded["frequency"].values
-    shapes = interpolate.CubicSpline(recorded["position"].values, recorded["mode_shape"].values, axis=1)(places)
+    shapes = interpolate.CubicSpline(along_track(recorded), recorded["mode_shape"].values, axis=1)(places)
     return omega[omega > 0.0], shapes[omega > 0.0].T
+
+
+def along_track(body: xr.Dataset) -> Array:
+    """Places (S,), m, of the mode shapes that an archive holds of a body: their last dimension, whatever its name."""
+    return np.asarray(body[body["mode_shape"].dims[-1]].values)
 
 
 def breakdown(results: Results, mass_ratio: Array, order: int) -> Array:

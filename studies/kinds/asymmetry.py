@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from studies.findings.settled import Asked, odd_parts, remainder_of_start, shown
 from studies.protocol.study import Kind
 from studies.results.axes import VARIANT
 from studies.results.findings_common import exceeds, first_carriage, in_words, told_statuses, uncertainty
-from studies.results.formatting import counted, listed, percent, quantity
+from studies.results.formatting import counted, listed, percent, quantity, spanned
 from studies.results.places import Index, extreme
 from studies.results.results import Results
 
@@ -200,12 +201,14 @@ def _lag(results: Results, sensor: str) -> str:
         return f"{sensor}: {_largest_lag(results, sensor, lag, expected)}; at the lowest speed it is {off}."
     slow = results.everywhere(results.dataset[axis.name]) <= limit
     calm = _largest_lag(results, sensor, np.where(slow, lag, np.nan), expected)
-    if limit == axis.values.max():
-        return f"{sensor}: {calm}, within {percent(CLOSE)} of {formula} in every variant."
-    span = " to ".join(quantity(float(end), "m") for end in (np.nanmin(lag), np.nanmax(lag)))
+    beyond = lag[~slow & np.isfinite(lag)]
+    if not beyond.size:
+        which = "every variant" if known.all() else "every variant with values"
+        return f"{sensor}: {calm}, within {percent(CLOSE)} of {formula} in {which}."
+    span = spanned(beyond.tolist(), partial(quantity, units="m"))
     return (
         f"{sensor}: up to {axis.in_words(limit)} every variant lags within {percent(CLOSE)} of {formula}: {calm}. "
-        f"Beyond, vibration left over from the turns (or the start) takes over, and the lag ranges from {span}."
+        f"Beyond, vibration left over from the turns (or the start) takes over, and the lag is {span}."
     )
 
 
@@ -242,8 +245,8 @@ def _mass(results: Results) -> list[str]:
         return []
     lag = abs(results.dataset["lag"])
     speed = results.axis(".motion.speed")
-    if speed is not None and speed.dim != VARIANT:
-        lag = lag.isel({speed.dim: int(np.argmin(speed.values))})
+    if speed is not None:
+        lag = lag.isel({speed.dim: np.flatnonzero(speed.values == speed.values.min())})
     high, low = lag.max(mass.dim), lag.min(mass.dim)
     change = np.asarray(((high - low) / high).where(high > 0.0).values, dtype=np.float64)
     if not np.isfinite(change).any():

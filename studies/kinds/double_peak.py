@@ -25,7 +25,14 @@ from studies.findings.settled import told_unsettled
 from studies.findings.two_peaks import EXPECTED, first_break, pattern, peaks_in_words, slowest
 from studies.protocol.study import Kind
 from studies.results.axes import PACES
-from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses, uncertainty
+from studies.results.findings_common import (
+    check_sensors,
+    first_carriage,
+    in_words,
+    told_statuses,
+    uncertainty,
+    while_held,
+)
 from studies.results.formatting import MINUS, ROUNDING, counted, listed, number, percent, times
 from studies.results.places import Index, chosen, extreme
 from studies.results.results import Results
@@ -151,7 +158,7 @@ class DoublePeak(Kind):
         """For every sensor of the answer the variant where two peaks end and that with the largest amplification."""
         sensors = list(chosen(list(results.sensors), MOST_SENSORS))
         places = [first_break(results, sensor) for sensor in sensors]
-        places += [extreme(results.of_sensor("dynamic_amplification", sensor)) for sensor in sensors]
+        places += [extreme(results.counting("dynamic_amplification", sensor)) for sensor in sensors]
         return [place for place in places if place is not None]
 
 
@@ -313,7 +320,7 @@ def _end_springs(results: Results, sensor: str) -> list[str]:
 
 def _amplified(results: Results, sensor: str) -> list[str]:
     """The largest amplification, and at low frequency beside the rule of thumb of a pinned beam."""
-    gain = results.numbers("dynamic_amplification", sensor)
+    gain = results.counting("dynamic_amplification", sensor)
     ratio = results.everywhere(theory.frequency_ratio(results))
     top, slow = extreme(gain), extreme(np.where(ratio <= SLOW, gain, np.nan))
     if top is None:
@@ -321,7 +328,7 @@ def _amplified(results: Results, sensor: str) -> list[str]:
     result = f"dynamic_amplification {sensor}"
     loosely = with_own_weight(results.study, sensor) + uncertainty(results, result, top)
     where = "" if hardly_changed(results, gain, partial(number, digits=4)) else in_words(results, top)
-    said = f"{sensor}: at most {times(float(gain[top]), 'the static value', 4)}{loosely}{where}"
+    said = f"{sensor}: {while_held(results)}at most {times(float(gain[top]), 'the static value', 4)}{loosely}{where}"
     if slow is None or slow == top:
         return [f"{said}{_rule(results, sensor, top)}."]
     below = f"below {number(SLOW)} of the first natural frequency at most {times(float(gain[slow]), digits=4)}"
@@ -340,26 +347,29 @@ def _rule(results: Results, sensor: str, place: Index) -> str:
 
 def _halves(results: Results, sensor: str) -> list[str]:
     """Whether the two halves of a cycle are alike."""
-    ratio = results.of_sensor("odd_even_ratio", sensor)
+    ratio, held = results.counting("odd_even_ratio", sensor), while_held(results)
     place = extreme(ratio)
     if place is None:
         return []
-    largest = float(np.asarray(ratio.values)[place])
+    largest = float(ratio[place])
     if largest < SYMMETRIC:
         alike = f"; odd harmonics are at most {percent(largest)} of the even" if largest > ROUNDING else ""
-        return [f"{sensor}: the two halves of a cycle are alike{alike}."]
-    start = _from_where(results, np.asarray(ratio.values))
+        return [f"{sensor}: {held}the two halves of a cycle are alike{alike}."]
+    start = _from_where(results, ratio)
     return [
-        f"{sensor}: the two halves of a cycle differ{start}; odd harmonics reach {number(largest)} times the even"
+        f"{sensor}: {held}the two halves of a cycle differ{start}; odd harmonics reach {number(largest)} times the even"
         f"{in_words(results, place)}."
     ]
 
 
 def _from_where(results: Results, odd: Array) -> str:
-    """From which frequency ratio on the halves of a cycle are visibly unlike, if not from the lowest on."""
+    """From which frequency ratio on the halves of a cycle are visibly unlike, if not from the lowest on; where first if
+    they are not so in every variant beyond."""
     ratio = results.everywhere(theory.frequency_ratio(results))
     unlike, known = odd > UNLIKE, np.isfinite(odd)
     if not unlike.any() or not (known & (ratio < ratio[unlike].min())).any():
         return ""
-    first = _pace_and_ratio(results, float(ratio[unlike].min()))
-    return f" by more than {percent(UNLIKE)} of the even harmonics from {first} on"
+    lowest = float(ratio[unlike].min())
+    first, stays = _pace_and_ratio(results, lowest), unlike[known & (ratio >= lowest)].all()
+    where = f"from {first} on" if stays else f"first at {first}"
+    return f" by more than {percent(UNLIKE)} of the even harmonics {where}"

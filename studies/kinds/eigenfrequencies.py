@@ -22,7 +22,7 @@ from studies.at_rest.labelling import BODY_PLACES, COORDINATES
 from studies.at_rest.positions import Asked, all_positions
 from studies.protocol.study import question_of
 from studies.results.findings_common import first_carriage, in_words
-from studies.results.formatting import counted, listed, number, percent, quantity
+from studies.results.formatting import counted, listed, number, ordinal, percent, quantity
 from studies.results.places import both_ends, extreme
 from studies.results.results import Results
 
@@ -174,14 +174,14 @@ def _signed(shapes: Array) -> Array:
 
 
 def _along(results: Results) -> str:
-    """The lowest frequency with the carriage in the middle and at the end of its way."""
+    """The lowest frequencies with the carriage in the middle and at the end of its way, or where it stands."""
     base, name = results.dataset["base_frequency"], results.carriage_name
-    middle, last = base.isel(position=base.sizes["position"] // 2), base.isel(position=-1)
+    middle, last = base.sizes["position"] // 2, base.sizes["position"] - 1
     shown = min(SHOWN, base.sizes["mode"])
     parts = [
         f"{listed([number(float(value), 4) for value in here.values[:shown]])} Hz with {name} at "
         f"{quantity(float(here.position), 'm')}"
-        for here in (middle, last)
+        for here in (base.isel(position=place) for place in dict.fromkeys((middle, last)))
     ]
     many = "lowest natural frequency is" if shown == 1 else f"{_WORDS[shown]} lowest natural frequencies are"
     of_base = " in the scene without its sweep" if results.size > 1 else ""
@@ -195,6 +195,20 @@ def _together(results: Results) -> list[str]:
     """Which frequency changes most along the way, and where two come closest."""
     base = np.asarray(results.dataset["base_frequency"].values)
     places = results.dataset["position"].values
+    said = _changes(base, places) if places.size > 1 else []
+    if base.shape[1] > 1:
+        gap = np.diff(base, axis=1) / base[:, :-1]
+        place = extreme(-gap)
+        if place is not None:
+            said.append(
+                f"Frequencies {place[1] + 1} and {place[1] + 2} come closest, {percent(float(gap[place]))} apart, at "
+                f"{quantity(float(places[place[0]]), 'm')}."
+            )
+    return said
+
+
+def _changes(base: Array, places: Array) -> list[str]:
+    """Which of the frequencies (position, mode) changes most along the way, and which do not."""
     change = np.ptp(base, axis=0) / base.min(axis=0)
     if not np.isfinite(change).any():
         return []
@@ -211,14 +225,6 @@ def _together(results: Results) -> list[str]:
             f"Frequenc{'y' if len(still) == 1 else 'ies'} {names} stay{'s' if len(still) == 1 else ''} within "
             f"{percent(STILL)}."
         )
-    if base.shape[1] > 1:
-        gap = np.diff(base, axis=1) / base[:, :-1]
-        place = extreme(-gap)
-        if place is not None:
-            said.append(
-                f"Frequencies {place[1] + 1} and {place[1] + 2} come closest, {percent(float(gap[place]))} apart, at "
-                f"{quantity(float(places[place[0]]), 'm')}."
-            )
     return said
 
 
@@ -249,9 +255,9 @@ def _unreduced(results: Results) -> list[str]:
         return []
     positions, modes = found.sizes["unreduced_position"], found.sizes["mode"]
     return [
-        f"Against the unreduced finite-element model at {counted(positions, 'position')}, the "
-        f"frequencies up to the {modes}th differ by at most {percent(abs(float(found.values[worst])))} (frequency "
-        f"{worst[1] + 1} with {results.carriage_name} at "
+        f"Against the unreduced finite-element model at {counted(positions, 'position')}, the frequencies up to the "
+        f"{ordinal(modes)} differ by at most {percent(abs(float(found.values[worst])))} (frequency {worst[1] + 1} "
+        f"with {results.carriage_name} at "
         f"{quantity(float(found['unreduced_position'].values[worst[0]]), 'm')})."
     ]
 
@@ -262,4 +268,4 @@ def _mode_counts(results: Results) -> list[str]:
         return []
     error, against = frequency_errors(results)
     modes = results.dataset.sizes["mode"]
-    return [enough_modes(results, error, FREQUENCY_WANTED, f"frequencies up to the {modes}th are", against)]
+    return [enough_modes(results, error, FREQUENCY_WANTED, f"frequencies up to the {ordinal(modes)} are", against)]

@@ -189,17 +189,17 @@ def _unreduced(results: Results) -> list[str]:
     moved = [name for name in known if results.sensors[name] == "m"]
     positions = results.dataset.sizes["unreduced_position"]
     said = (
-        f"Against the unreduced finite-element model at {counted(positions, 'position')}, readings differ by at most "
+        f"Against the unreduced finite-element model at {counted(positions, 'position')}, readings differ by "
         f"{_part(known[worst])} of the sensor's largest ({worst})"
     )
     if not moved or worst in moved:
         return [f"{said}."]
-    return [f"{said}, displacements by at most {_part(max(known[name] for name in moved))}."]
+    return [f"{said}, displacements by {_part(max(known[name] for name in moved))}."]
 
 
 def _part(error: float) -> str:
-    """A part in percent, or that it is rounding."""
-    return percent(error) if error > ROUNDING else f"less than {percent(ROUNDING)}"
+    """A largest part in percent, or that it is rounding."""
+    return f"at most {percent(error)}" if error > ROUNDING else f"less than {percent(ROUNDING)}"
 
 
 def _mode_counts(results: Results) -> list[str]:

@@ -27,7 +27,14 @@ from studies.findings.envelopes import beyond_sensors, sizes_along, told_along
 from studies.findings.residual import check_residual, most_ringing, residuals
 from studies.protocol.study import Kind, question_of
 from studies.results.axes import PACES, VARIANT, Axis
-from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses, uncertainty
+from studies.results.findings_common import (
+    check_sensors,
+    first_carriage,
+    in_words,
+    told_statuses,
+    uncertainty,
+    while_held,
+)
 from studies.results.formatting import counted, listed, number, quantity, times
 from studies.results.places import Index, chosen, extreme
 from studies.results.results import Results
@@ -107,10 +114,8 @@ def _largest(results: Results, sensor: str) -> str:
     gain, (top, best) = results.numbers("dynamic_amplification", sensor), _extremes(results, sensor)
     if top is None:
         return f"{sensor}: no variant has values."
-    opened = "while the contact holds, " if results.held.any() else "with a contact that opens in every variant, "
-    shown = "" if results.held[results.kept.values].all() else opened
     value = _value(results, sensor, top)
-    said = f"{sensor}: {shown}the largest {results.noun(sensor)} {results.place(sensor)} is {value}"
+    said = f"{sensor}: {while_held(results)}the largest {results.noun(sensor)} {results.place(sensor)} is {value}"
     if same := unchanged(results, sizes(results, sensor)):
         return f"{said} and {same}."
     where = f"{in_words(results, top)}{_at_the_end(results, top)}"
@@ -157,7 +162,7 @@ def _amplified(results: Results, sensor: str) -> str:
 
 def _amplified_besides(results: Results, told: str) -> str:
     """Which sensors besides that one exceed statics by as much as the question names, the most first."""
-    gains = {name: results.numbers("dynamic_amplification", name) for name in results.sensors if name != told}
+    gains = {name: results.counting("dynamic_amplification", name) for name in results.sensors if name != told}
     most = {name: float(np.nanmax(gain)) for name, gain in gains.items() if np.isfinite(gain).any()}
     threshold = question_of(results.study, AskedOfPassages).amplification
     beyond = sorted((name for name, gain in most.items() if gain > threshold), key=lambda name: -most[name])

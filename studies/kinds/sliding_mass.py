@@ -16,6 +16,7 @@ declare("sliding-mass", *RESULTS)
 #: What the paper gives, and the largest |a_z - g| that it tells, m/s2.
 OF_PAPER = {"mass": 100.0, "motion.start": 2.0, "motion.speed": 0.0}
 DAMPING, LARGEST_TOLD = 0.02, 20.0
+BODY = {"length": 15.0, "area": 0.01, "second_moment": 8.33e-6, "youngs_modulus": 2.1e11, "density": 7850.0, "modes": 1}
 
 
 class SlidingMass(MovingFrames):
@@ -43,7 +44,10 @@ def _beside_the_paper(results: Results) -> list[str]:
     """What of the paper's figure 3 is there, where its numbers are among the variants."""
     name = results.carriage_name
     body = results.study.carriage[name].on
+    if not _is_papers(results, body):
+        return []
     wanted = {f"carriage.{name}.{key}": value for key, value in OF_PAPER.items()}
+    wanted |= {f"body.{body}.{key}": value for key, value in BODY.items()}
     peaks = {damping: _peak(results, wanted | {f"body.{body}.damping_ratio": damping}) for damping in (DAMPING, 0.0)}
     if np.isnan(peaks[DAMPING]):
         return []
@@ -59,10 +63,17 @@ def _beside_the_paper(results: Results) -> list[str]:
     ]
 
 
+def _is_papers(results: Results, body: str) -> bool:
+    """Whether a body has the numbers of the paper's, and its supports."""
+    table = results.study.data["body"][body]
+    pinned = table.get("kind") == "beam" and table.get("supports") == "pinned-pinned"
+    return pinned and all(isinstance(results.study.value(f"body.{body}.{key}"), int | float) for key in BODY)
+
+
 def _peak(results: Results, wanted: dict[str, float]) -> float:
     """The largest contact force per mass of the variant with these numbers; NaN where there is none."""
     force = results.dataset[f"{results.carriage_name}_contact_force_max"].values
     here = np.ones(force.shape, dtype=np.bool_)
     for path, value in wanted.items():
-        here &= np.isclose(results.everywhere(results.parameter(path)), value)
+        here &= np.isclose(results.everywhere(results.parameter(path)), value, atol=1e-12)
     return float(force[here][0] / wanted[f"carriage.{results.carriage_name}.mass"]) if here.any() else np.nan

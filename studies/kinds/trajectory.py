@@ -1,5 +1,7 @@
 """What happens when? Histories of every sensor and of the carriages' own motion."""
 
+from functools import partial
+
 import numpy as np
 
 from engine.scene.study import Study
@@ -8,8 +10,8 @@ from results_schema.variables import MARCH, declare
 from studies.findings.beyond import of_every_quantity
 from studies.findings.residual import AskedOfRest, check_residual, most_ringing, residuals
 from studies.protocol.study import Kind, question_of
-from studies.results.findings_common import check_sensors, first_carriage, told_statuses, uncertainty
-from studies.results.formatting import counted, quantity
+from studies.results.findings_common import check_sensors, first_carriage, over_all, told_statuses, uncertainty
+from studies.results.formatting import counted, quantity, spanned
 from studies.results.places import Index
 from studies.results.results import Results
 
@@ -68,13 +70,13 @@ KIND = Trajectory()
 def _kept(results: Results) -> str:
     """How many histories there are, how long and how fine."""
     traced = results.traced()
-    trace = results.trace(next(iter(results.sensors)), traced[0])
-    points = int(np.isfinite(trace.values).sum())
-    ends = [results.trace(next(iter(results.sensors)), index).end for index in traced]
-    spans = " to ".join(dict.fromkeys(quantity(end, "s") for end in (min(ends), max(ends))))
+    traces = [results.trace(next(iter(results.sensors)), index) for index in traced]
+    points = [int(np.isfinite(trace.values).sum()) for trace in traces]
+    spans = spanned((trace.end for trace in traces), partial(quantity, units="s"))
+    fewest = "" if min(points) == max(points) else f"{min(points):,} to "
     return (
         f"Histories of {counted(len(traced), 'variant')} out of {results.size:,}, each over {spans} "
-        f"on {counted(points, 'station')}."
+        f"on {fewest}{counted(max(points), 'station')}."
     )
 
 
@@ -84,11 +86,10 @@ def _span(results: Results, sensor: str) -> str:
     low, high = (results.dataset[f"{sensor}_{side}"].values for side in ("min", "max"))
     if np.isnan(low).all():
         return f"{sensor}: no variant has values."
-    over = " over all variants" if results.size > 1 else ""
     ends = float(np.nanmin(low)), float(np.nanmax(high))
     span = " to ".join(quantity(end, units, beside=max(map(abs, ends))) for end in ends)
     places = (results.index_of(int(flat)) for flat in (np.nanargmin(low), np.nanargmax(high)))
     named = zip((f"{sensor}_min", f"{sensor}_max"), places, strict=True)
     looser = max(named, key=lambda end: np.nan_to_num(results.error_at(*end)))
     what = f"{results.noun(sensor)} {results.place(sensor)}"
-    return f"{sensor}: the {what} goes from {span}{over}{uncertainty(results, *looser)}."
+    return f"{sensor}: the {what} goes from {span}{over_all(results)}{uncertainty(results, *looser)}."

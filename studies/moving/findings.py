@@ -9,7 +9,7 @@ from studies.findings.absolute_errors import errors_of_size
 from studies.findings.amplification import sizes
 from studies.findings.beyond import limits_of, ranked, told_limit
 from studies.findings.effects import by_effect
-from studies.results.findings_common import in_words, told_statuses, uncertainty
+from studies.results.findings_common import in_words, over_all, told_statuses, uncertainty, while_held
 from studies.results.formatting import counted, quantity
 from studies.results.places import extreme
 from studies.results.results import Results
@@ -45,19 +45,19 @@ def sliding(results: Results) -> Iterator[str]:
     for name, carriage in results.study.carriage.items():
         if not carriage.motion.slides or np.isnan(dataset[f"{name}_position_max"].values).all():
             continue
-        over = " over all variants" if results.size > 1 else ""
         way = _span(dataset[f"{name}_position_min"].values, dataset[f"{name}_position_max"].values, "m")
         swings = dataset[f"{name}_period"].values
-        said = f"{name} slides from {way}{over}"
+        said = f"{name} slides from {way}{over_all(results)}"
         if np.isfinite(swings).any():
             many = results.size > 1
             said += f", with a period of {_span(swings, swings, 's') if many else quantity(float(swings), 's', 4)}"
         yield f"{said}."
-        force = dataset[f"{name}_contact_force_max"]
+        ends = (dataset[f"{name}_contact_force_{end}"] for end in ("min", "max"))
+        low, force = (one.where(results.with_values) for one in ends)
         index = extreme(force)
         if index is not None:
-            span = _span(dataset[f"{name}_contact_force_min"].values, force.values, "N")
-            yield f"Its contact force goes from {span}, the largest{in_words(results, index)}."
+            its = f"{while_held(results)}its contact force goes from {_span(low.values, force.values, 'N')}"
+            yield f"{its[0].upper()}{its[1:]}, the largest{in_words(results, index)}."
 
 
 def _ended(results: Results, seconds: float) -> Iterator[str]:
@@ -83,14 +83,15 @@ def _sensors(results: Results) -> Iterator[str]:
         if limit is not None:
             axis = next(iter(by_effect(results, largest)), None)
             error = errors_of_size(results, sensor)
-            beyond = told_limit(results, np.asarray(largest), limit, results.sensors[sensor], axis, error)
+            beyond = told_limit(results, sizes(results, sensor), limit, results.sensors[sensor], axis, error)
         if results.study.sensor[sensor].reads.of_arm:
             yield from _position_error(results, sensor, beyond)
             continue
         index = extreme(largest)
         assert index is not None
         span = _span(low.values[index], high.values[index], results.sensors[sensor])
-        yield f"{sensor}: the {results.noun(sensor)} goes from {span}{in_words(results, index)}.{beyond}"
+        what = f"{while_held(results)}the {results.noun(sensor)}"
+        yield f"{sensor}: {what} goes from {span}{in_words(results, index)}.{beyond}"
 
 
 def _position_error(results: Results, sensor: str, beyond: str) -> Iterator[str]:
@@ -98,7 +99,8 @@ def _position_error(results: Results, sensor: str, beyond: str) -> Iterator[str]
     said of a limit."""
     after = _most_and_least(results, f"{sensor}{AFTER_STOP}")
     where, most = f"{along_way(results, sensor)} {results.place(sensor)}", _most_and_least(results, sensor)
-    yield f"{sensor}: the largest position error{where}, from where the rigid arm would have it, is {most}.{beyond}"
+    what = f"{while_held(results)}the largest position error{where}"
+    yield f"{sensor}: {what}, from where the rigid arm would have it, is {most}.{beyond}"
     if after:
         yield f"After the stop it is still up to {after}."
 
@@ -113,7 +115,7 @@ def along_way(results: Results, sensor: str) -> str:
 
 def _most_and_least(results: Results, name: str) -> str:
     """The largest and the smallest over the sweep of the largest absolute value of a result; "" where there is none."""
-    found = sizes(results, name)
+    found = np.where(results.with_values, sizes(results, name), np.nan)
     most, least = extreme(found), extreme(found, np.nanargmin)
     if most is None or least is None:
         return ""
@@ -134,7 +136,7 @@ def _driven(results: Results) -> Iterator[str]:
         if index is not None:
             span = _span(low.values[index], high.values[index], "N")
             loosely = uncertainty(results, f"{name}_contact_force_max", index)
-            yield f"{name}: the contact force goes from {span}{loosely}{in_words(results, index)}."
+            yield f"{name}: {while_held(results)}the contact force goes from {span}{loosely}{in_words(results, index)}."
 
 
 def _ends(results: Results) -> Iterator[str]:

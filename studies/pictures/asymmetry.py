@@ -168,19 +168,19 @@ def _lag(seen: View, sensors: list[str], more: str) -> Figure:
         more,
     )
     height = 0.6 + 2.3 * len(sensors)
-    lags = np.concatenate([curve.y for curve in _lags(seen, sensors[0])])
-    return draw("lag", _lag_title(seen, sensors[0], lags), caption, height, partial(_draw_lag, seen, sensors))
+    return draw("lag", _lag_title(results, sensors[0]), caption, height, partial(_draw_lag, seen, sensors))
 
 
-def _lag_title(seen: View, sensor: str, lags: Array) -> str:
-    """How far the response trails or runs ahead at most, of what is shown."""
+def _lag_title(results: Results, sensor: str) -> str:
+    """How far the response trails or runs ahead at most, whatever part of the sweep is drawn."""
+    lags = results.numbers("lag", sensor)
     trails, ahead = -float(np.nanmin(lags, initial=0.0)), float(np.nanmax(lags, initial=0.0))
     parts = [
         f"{words} by up to {quantity(size, 'm')}"
         for words, size in (("trails", trails), ("runs ahead", ahead))
         if size > 0.0
     ]
-    return f"The {seen.results.noun(sensor)} {seen.results.place(sensor)} {' or '.join(parts) or 'has no lag'}"
+    return f"The {results.noun(sensor)} {results.place(sensor)} {' or '.join(parts) or 'has no lag'}"
 
 
 def _lags(seen: View, sensor: str) -> list[Curve]:
@@ -243,12 +243,12 @@ def _parts(seen: View, sensors: list[str], more: str) -> Figure:
     )
     height = 0.6 + 2.3 * len(sensors)
     results, first = seen.results, sensors[0]
-    excess = np.where(np.isfinite(_odd(seen, first)), seen.plane(results.of_sensor("even_excess", first)), np.nan)
-    even = np.nanmax(np.abs(excess), initial=0.0)
+    odd = _odd_where_settled(results, first)
+    even = np.where(np.isfinite(odd), np.abs(results.numbers("even_excess", first)), np.nan)
+    most = [percent(float(np.nanmax(part, initial=0.0))) for part in (odd, even)]
     title = (
-        f"{first.replace('_', ' ')}: the ways differ by up to "
-        f"{percent(float(np.nanmax(_odd(seen, first), initial=0.0)))} of the static range, their mean from statics by "
-        f"up to {percent(float(even))}"
+        f"{first.replace('_', ' ')}: the ways differ by up to {most[0]} of the static range, their mean from statics "
+        f"by up to {most[1]}"
     )
     return draw("odd-and-even", title, caption, height, partial(_draw_parts, seen, sensors))
 

@@ -12,6 +12,7 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure as Drawing
 
 from results_schema.arrays import Array
+from results_schema.lazy_imports import xr
 from studies.findings import theory
 from studies.findings.two_peaks import first_break
 from studies.pictures.common import figures as look
@@ -30,6 +31,7 @@ from studies.pictures.common.sweep_view import (
     view,
 )
 from studies.pictures.common.traces import picked
+from studies.results.findings_common import while_held
 from studies.results.formatting import counted, listed, number, scale_for
 from studies.results.places import Index, chosen, extreme
 from studies.results.results import Results
@@ -60,8 +62,7 @@ PEAK_COLOURS = ("#56b4e9", "#eef0f3", "#e69f00", "#0072b2", "#cc79a7", "#d55e00"
 def pictures(results: Results) -> list[Figure]:
     """All figures that the sweep and the kept histories allow."""
     sensors = list(chosen(list(results.sensors), MOST_SENSORS))
-    gain = results.of_sensor("dynamic_amplification", sensors[0])
-    top = extreme(gain)
+    top = extreme(results.counting("dynamic_amplification", sensors[0]))
     shown = _typical(results, sensors[0])
     found = [_cycle(results, sensors, shown)] if shown else []
     seen = view(results, SPEEDS, MASSES, top)
@@ -79,7 +80,7 @@ def pictures(results: Results) -> list[Figure]:
 
 def _odd_view(results: Results, sensors: list[str]) -> View:
     """The sweep where odd harmonics are largest over even ones, along what changes this ratio most."""
-    ratios = {sensor: results.of_sensor("odd_even_ratio", sensor) for sensor in sensors}
+    ratios = {sensor: _counting(results, "odd_even_ratio", sensor) for sensor in sensors}
     best = max(sensors, key=lambda sensor: float(np.nan_to_num(ratios[sensor].values).max()))
     top, axis = extreme(ratios[best]), results.deciding_axis("odd_even_ratio", best)
     seen = view(results, SPEEDS, MASSES, top)
@@ -135,7 +136,7 @@ def _typical(results: Results, sensor: str) -> list[Index]:
         groups.setdefault(float(counts[index]), []).append(index)
     largest = sorted(groups.values(), key=len, reverse=True)
     found = [group[len(group) // 2] for group in largest[:MOST_CYCLES]]
-    gain = results.numbers("dynamic_amplification", sensor)
+    gain = results.counting("dynamic_amplification", sensor)
     broken = first_break(results, sensor)
     named = [index for index in traced if index == broken]
     found = list(dict.fromkeys([*named, *picked(results, gain, results.size)[-1:], *found]))[:MOST_CYCLES]
@@ -291,7 +292,8 @@ def _ratio(seen: View, variable: str, sensors: list[str]) -> list[Figure]:
     for sensor in sensors:
         plane = seen.plane(seen.results.of_sensor(variable, sensor))
         if np.isfinite(plane).any():
-            tops[sensor] = float(np.nanmax(plane, initial=0.0))
+            held = seen.plane(_counting(seen.results, variable, sensor))
+            tops[sensor] = float(np.nanmax(held if np.isfinite(held).any() else plane))
     if not tops:
         return []
     name, title, _, caption = RATIOS[variable]
@@ -299,7 +301,13 @@ def _ratio(seen: View, variable: str, sensors: list[str]) -> list[Figure]:
     what = f"{seen.results.noun(best)} {seen.results.place(best)}"
     top = title.format(value=number(tops[best]), what=what)
     height, fill = 0.6 + 2.2 * len(tops), partial(_draw_rows, seen, list(tops), variable)
-    return [draw(name, top, seen.caption(caption), height, fill)]
+    opened = "While the contact holds the title counts; lines go on beyond." if while_held(seen.results) else ""
+    return [draw(name, top, seen.caption(caption, opened), height, fill)]
+
+
+def _counting(results: Results, variable: str, sensor: str) -> xr.DataArray:
+    """A result over the sweep, NaN where a variant does not speak for all."""
+    return results.of_sensor(variable, sensor).copy(data=results.counting(variable, sensor))
 
 
 def _draw_rows(seen: View, sensors: list[str], variable: str, drawing: Drawing) -> None:

@@ -12,7 +12,7 @@ from studies.at_rest.findings import FREQUENCY_WANTED, frequency_errors, moves_n
 from studies.pictures import at_rest
 from studies.pictures.common.figures import HAIR, INK, MUTED, Figure, draw, legend_of_all, shades, widen
 from studies.pictures.common.sweep_view import View
-from studies.results.formatting import ALIKE, listed, number, quantity
+from studies.results.formatting import ALIKE, listed, number, ordinal, quantity
 from studies.results.results import Results
 
 SWEPT_MODES = 3  # with a panel over the sweep
@@ -31,7 +31,7 @@ def pictures(results: Results) -> list[Figure]:
         error, against = frequency_errors(results)
         counts = [int(count) for count in results.dataset["mode_count"].values]
         modes = results.dataset.sizes["mode"]
-        words = f"Largest relative error of the frequencies up to the {modes}th, against {against}."
+        words = f"Largest relative error of the frequencies up to the {ordinal(modes)}, against {against}."
         if np.isnan(error).any():
             words += " Where there is no point, modes are too few to have them all."
         found.append(at_rest.error_figure(results, [at_rest.Errors("", counts, error)], FREQUENCY_WANTED, words))
@@ -45,7 +45,11 @@ def _over_position(results: Results) -> Figure:
     )
     if results.size > 1:
         caption += " Of the scene without its sweep."
-    title = _changing(np.asarray(results.dataset["base_frequency"].values, dtype=np.float64))
+    base = results.dataset["base_frequency"]
+    title = _changing(np.asarray(base.values, dtype=np.float64))
+    if base.sizes["position"] == 1:
+        lowest, at = number(float(base[0, 0]), 4), quantity(float(base["position"][0]), "m")
+        title = f"The lowest natural frequency is {lowest} Hz with {results.carriage_name} at {at}"
     return draw("frequencies", title, caption, 4.2, partial(_draw_over_position, results))
 
 
@@ -106,8 +110,10 @@ def _draw_over_sweep(seen: View, shown: int, drawing: Drawing) -> None:
 
 def _shapes(results: Results) -> Figure:
     count, carriages = min(SHAPES, results.dataset.sizes["mode"]), results.study.carriage.values()
+    several = results.dataset.sizes["position"] > 1
+    where = "at the beginning, in the middle and at the end of its way" if several else "where it stands"
     caption = (
-        f"The lowest {count} shapes with the carriage at the beginning, in the middle and at the end of its way, each "
+        f"The lowest {count} shapes with the carriage {where}, each "
         "scaled to its own largest motion. Grey: at rest."
         + (" What rides is drawn above what it rides." if any(c.riding_body for c in carriages) else "")
     )

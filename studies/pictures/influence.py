@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from studies.at_rest.findings import READING_WANTED, contacts_vary, reading_errors
+from studies.at_rest.findings import READING_WANTED, ROUNDING, contacts_vary, reading_errors
 from studies.pictures import at_rest
 from studies.pictures.common.figures import BLUE, INK, Figure, draw, legend_beside, legend_of_all, shades, widen
 from studies.pictures.common.sweep_view import Curve
@@ -54,11 +54,23 @@ def _readings(results: Results, sensors: list[str]) -> Figure:
         texts.append(at_rest.held_words(seen))
     height = 0.7 + 1.7 * len(sensors)
     caption = " ".join(text for text in texts if text)
-    first, values = sensors[0], results.dataset[sensors[0]].values
-    low, high = (quantity(float(end), results.sensors[first]) for end in (np.nanmin(values), np.nanmax(values)))
-    title = f"The static {results.noun(first)} {results.place(first)} "
-    title += f"is {low} all along the way" if low == high else f"goes from {low} to {high} along the way"
-    return draw("readings", title, caption, height, partial(_draw, results, sensors))
+    return draw("readings", _title(results, sensors[0]), caption, height, partial(_draw, results, sensors))
+
+
+def _title(results: Results, sensor: str) -> str:
+    """Between which readings a sensor lies, and whether the way or the sweep changes them."""
+    found, units = results.dataset[sensor], results.sensors[sensor]
+    low, high = (quantity(float(end), units) for end in (np.nanmin(found.values), np.nanmax(found.values)))
+    said = f"The static {results.noun(sensor)} {results.place(sensor)}"
+    if low == high:
+        return f"{said} is {low} all along the way"
+    if results.size == 1:
+        return f"{said} goes from {low} to {high} along the way"
+    largest = float(np.nanmax(np.abs(found.values)))
+    way = float((found.max("position") - found.min("position")).max())
+    if way <= ROUNDING * largest:
+        return f"{said} lies between {low} and {high} over the sweep, each all along the way"
+    return f"{said} lies between {low} and {high} over the way and the sweep"
 
 
 def _draw(results: Results, sensors: list[str], drawing: Drawing) -> None:

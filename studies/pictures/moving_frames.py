@@ -74,7 +74,7 @@ def _of_tips(seen: View, tips: list[str], top: Index) -> Figure:
         "Largest distances from where the rigid arm would have them, in the whole time and from where its joints stop.",
         f"{counted(len(tips) - MOST_TIPS, 'more sensor')} in the archive." if len(tips) > MOST_TIPS else "",
     )
-    shown = tips
+    shown = tips[:MOST_TIPS]
     return draw("position-errors", title, caption, 0.9 + 2.1 * len(shown), partial(_draw_tips, seen, shown))
 
 

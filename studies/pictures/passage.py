@@ -33,7 +33,7 @@ from studies.pictures.common.sweep_view import (
 from studies.pictures.common.traces import picked
 from studies.protocol.study import question_of
 from studies.results.formatting import number
-from studies.results.places import Index, extreme
+from studies.results.places import Index
 from studies.results.results import Results
 
 MOST_HISTORIES = 4
@@ -112,11 +112,13 @@ def _has_contact(seen: View, carriage: str) -> bool:
 
 def _map(seen: View, sensor: str) -> Figure:
     results = seen.results
-    best = extreme(seen.cut(gain(results, sensor)))
-    assert best is not None
-    peak = float(seen.cut(gain(results, sensor)).values[best])
-    title = f"{sensor.replace('_', ' ')}: dynamic over static is {number(peak)} at most"
-    return draw("amplification-map", title, seen.caption(), 3.4, partial(_draw_map, seen, sensor))
+    shown, status = seen.plane(gain(results, sensor)), results.dataset["status"].transpose(*results.dims)
+    counting = seen.plane(status.copy(data=results.with_values)) > 0.0
+    opened = bool((np.isfinite(shown) & ~counting).any())
+    counting = counting if np.isfinite(shown[counting]).any() else np.isfinite(shown)
+    title = f"{sensor.replace('_', ' ')}: dynamic over static is {number(float(np.nanmax(shown[counting])))} at most"
+    caption = seen.caption("While the contact holds the title counts; the map goes on beyond." if opened else "")
+    return draw("amplification-map", title, caption, 3.4, partial(_draw_map, seen, sensor))
 
 
 def _draw_map(seen: View, sensor: str, drawing: Drawing) -> None:
@@ -162,12 +164,16 @@ def _smallest_force(seen: View, carriages: list[str]) -> Any:
 
 
 def _from(seen: View, force: Any) -> str:
-    """From which value of the horizontal axis on a force turns negative anywhere in the shown part."""
+    """From which value of the horizontal axis on a force turns negative anywhere in the shown part; where first if it
+    does not at every value beyond."""
     assert seen.x is not None
     grid = seen.plane(force)
-    opened = (np.nan_to_num(grid) < 0.0).reshape(len(grid), -1).any(axis=1)
-    first = float(seen.along(seen.x)[opened].min())
-    return f" from {seen.x.noun} {seen.x.in_words(first / seen.x.factor)} on"
+    known = np.isfinite(grid).reshape(len(grid), -1).any(axis=1)
+    opened = np.asarray((np.nan_to_num(grid) < 0.0).reshape(len(grid), -1).any(axis=1))
+    along = seen.along(seen.x)
+    first = float(along[opened].min())
+    at = f"{seen.x.noun} {seen.x.in_words(first / seen.x.factor)}"
+    return f" from {at} on" if opened[known & (along >= first)].all() else f", first at {at}"
 
 
 def _relative_force(seen: View, carriage: str) -> Any:

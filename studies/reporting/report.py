@@ -30,8 +30,9 @@ from studies.pictures.common import estimates, unreduced
 from studies.pictures.common.figures import png, svg
 from studies.protocol.study import kind_named
 from studies.reporting.answers import figures_of, found_of
-from studies.reporting.summary import in_tables, noun
-from studies.results.formatting import counted, number, unit_text
+from studies.reporting.summary import every, in_tables, noun
+from studies.results.axes import Axis
+from studies.results.formatting import counted, number, typed_unit, unit_text
 from studies.results.results import Results
 from studies.runs import audit
 from studies.runs.archived import results_of
@@ -47,7 +48,6 @@ if TYPE_CHECKING:
 PAGE = "report.html"
 TEMPLATES = Path(__file__).parent / "templates"
 LONG_TEXT = 120
-EVERYWHERE = "in every variant"
 UNIT = re.compile(  # the space between a number and its unit, and that within N m
     r"(?<=\d) (?=(?:%|[nµmkMG]?(?:m|N|Pa|Hz|s|g|J|rad|t)(?![a-z])))|(?:(?<=\d [nµmkMG]N)|(?<=\d N)) (?=m(?![a-z]))"
 )
@@ -161,7 +161,7 @@ def page_of(source: Archive, results: Results, drawn: Sequence[Drawn], of_questi
         statuses=_statuses(results),
         lost=not all(status.values_kept for status in results.status_counts),
         scene=_scene(results),
-        sweep=[_sweep_row(results, place) for place in range(len(results.axes))],
+        sweep=_sweep(results),
         results=_results(results),
         percentiles=[f"{value:g} %" for value in results.percentiles],
         declarations=_declarations(results),
@@ -329,10 +329,16 @@ def _plain(value: Any) -> str:
     return number(value, 9) if isinstance(value, float) else str(value)
 
 
-def _sweep_row(results: Results, place: int) -> Row:
-    axis = results.axes[place]
-    written = results.study.sweep.axes[axis.name].of
-    return Row(axis.noun, f"{axis.span}, {counted(len(axis.values), 'value')}", ", ".join(written))
+def _sweep(results: Results) -> list[Row]:
+    """Every swept number with its span, those too along which an archive of cells has no results."""
+    from engine.scene.sweep import expand
+
+    found = []
+    for one in expand(results.study).axes if results.study.sweep.axes else ():
+        values, typed = np.asarray(one.values, dtype=np.float64), typed_unit(results.study, one.name)
+        axis = Axis(one.name, one.dim, one.targets, values, one.units, typed)
+        found.append(Row(axis.noun, f"{axis.span}, {counted(values.size, 'value')}", ", ".join(one.of)))
+    return found
 
 
 def _results(results: Results) -> list[tuple[str, ...]]:
@@ -341,7 +347,7 @@ def _results(results: Results) -> list[tuple[str, ...]]:
     for found in in_tables(results):
         both = (found.smallest, found.largest)
         ends, alike = [found.said(end, 4) for end in both], found.is_constant and results.size > 1
-        low, high = ((found.partly or EVERYWHERE) if alike else end.where for end in both)
+        low, high = ((found.partly or f"in {every(results)}") if alike else end.where for end in both)
         between = [found.value(value, 4) for value in found.percentiles]
         rows.append((found.name, found.sensor, ends[0], low, ends[1], high, *between))
     return rows

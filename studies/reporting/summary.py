@@ -118,6 +118,15 @@ def noun(results: xr.Dataset) -> str:
     return "point" if is_measured(results) else "variant"
 
 
+def every(results: Results) -> str:
+    """All of which a result can be told to be the same, in words: of what has no values nothing is known."""
+    lost = sum(count for status, count in results.status_counts.items() if not status.values_kept)
+    known, own = results.variants - lost, noun(results.dataset)
+    if not lost:
+        return f"every {own}"
+    return f"all {counted(known, own)} with values" if known > 1 else f"the one {own} with values"
+
+
 def counts(results: xr.Dataset) -> dict[str, int]:
     """Number of variants by status, those that occur."""
     return {label(status): count for status, count in counts_of(results).items()}

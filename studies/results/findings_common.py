@@ -77,6 +77,21 @@ def in_words(results: Results, index: Index) -> str:
     return f" at {at}" if at else ""
 
 
+def over_all(results: Results) -> str:
+    """That a range is of all variants, or of all of those with values; "" where there is one."""
+    known = int(results.kept.values.sum())
+    if results.size == 1:
+        return ""
+    return " over all variants" if known == results.size else f" over {counted(known, 'variant')} with values"
+
+
+def while_held(results: Results) -> str:
+    """That what follows is of the variants whose contact holds, or that none does; "" where all do."""
+    if results.held[results.kept.values].all():
+        return ""
+    return "while the contact holds, " if results.held.any() else "with a contact that opens in every variant, "
+
+
 def uncertainty(results: Results, result: str, place: Index) -> str:
     """How loosely a named value is known, for the sentence that names it; "" where its estimated error is small.
 

@@ -168,6 +168,16 @@ def counted(count: int, noun: str) -> str:
     return f"{count:,} {noun}{'' if count == 1 else 's'}"
 
 
+def ordinal(number: int) -> str:
+    """A number in an order.
+
+    >>> [ordinal(number) for number in (1, 2, 3, 8, 11, 12, 13, 22)]
+    ['1st', '2nd', '3rd', '8th', '11th', '12th', '13th', '22nd']
+    """
+    ending = "th" if number % 100 in (11, 12, 13) else {1: "st", 2: "nd", 3: "rd"}.get(number % 10, "th")
+    return f"{number}{ending}"
+
+
 def listed(parts: Sequence[str]) -> str:
     """Parts joined as in a sentence.
 

@@ -314,6 +314,10 @@ class Results:
         """The same as plain numbers."""
         return np.asarray(self.of_sensor(variable, sensor).values, dtype=np.float64)
 
+    def counting(self, variable: str, sensor: str) -> Array:
+        """The same of the variants that speak for all, NaN of others."""
+        return np.where(self.with_values, self.numbers(variable, sensor), np.nan)
+
     def estimated_error(self, result: str) -> Array:
         """The estimated error of a reported number, in the sweep's shape; NaN where none is known."""
         if "estimated_error" not in self.dataset or result not in self.dataset["result"].values:

@@ -90,10 +90,11 @@ def _held(results: Results) -> Iterator[str]:
     best, most = extreme(off, np.nanargmin), extreme(off)
     if best is None or most is None:
         return
-    least, largest = float(off[best]), float(off[most])
-    if results.size == 1 or largest <= (1.0 + ALIKE) * least:
-        of_all = f" in every variant within {percent(ALIKE)}" if results.size > 1 else ""
-        yield f"{HOLDING} tools are off their plan by up to {quantity(largest, 'm')}{of_all}."
+    least, largest, known = float(off[best]), float(off[most]), int(np.isfinite(off).sum())
+    if known == 1 or largest <= (1.0 + ALIKE) * least:
+        every = "every variant" if known == results.size else f"all {counted(known, 'variant')} with values"
+        where = f" in {every} within {percent(ALIKE)}" if known > 1 else in_words(results, most)
+        yield f"{HOLDING} tools are off their plan by up to {quantity(largest, 'm')}{where}."
         return
     alike = int(np.count_nonzero(off <= (1.0 + ALIKE) * least))
     many = f", and as little within {percent(ALIKE)} in {counted(alike - 1, 'other variant')}" if alike > 1 else ""

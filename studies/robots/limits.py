@@ -11,6 +11,7 @@ import numpy as np
 
 from engine.study_file.units import Length, unit_of
 from results_schema.arrays import Array, Mask
+from studies.findings.absolute_errors import OF_TOOLS, absolute_errors
 from studies.protocol.study import question_of
 from studies.results.axes import VARIANT, Axis
 from studies.results.findings_common import in_words
@@ -136,9 +137,8 @@ class _Found:
     @property
     def error(self) -> Array:
         """(..., R) m: what errors of tools are told of."""
-        longest = np.fmax.reduce([self.results.dataset[f"error_{doing}"].values for doing in DOING])
-        parts = [self.results.estimated_error(f"error of {name}") for name in self.results.study.robot]
-        return np.asarray(np.stack(parts, axis=-1) * longest)
+        each = [absolute_errors(self.results, OF_TOOLS[0], name) for name in self.results.study.robot]
+        return np.stack(each, axis=-1)
 
     def _all(self) -> str:
         """That they do so everywhere."""

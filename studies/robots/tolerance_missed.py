@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from results_schema.status import Status, label
+from studies.findings.absolute_errors import OF_TOOLS, absolute_errors
 from studies.results.findings_common import in_words
 from studies.results.formatting import counted, listed, percent, quantity
 from studies.results.places import Index, extreme
@@ -58,13 +59,11 @@ def _in_words(results: Results, one: _Missed) -> str:
     """The result, how far it may be off, where, and when."""
     kind, name = one.name.split(" of ", 1)
     if kind == "error":
-        doings = (f"error_{doing}" for doing in ("moving", "working", "holding"))
-        largest = np.nanmax([results.dataset[doing].sel(robot=name).values[one.at] for doing in doings])
-        noun, units = f"the tool error of {name}", "m"
+        error, noun, units = absolute_errors(results, OF_TOOLS[0], name), f"the tool error of {name}", "m"
     else:
-        largest = results.dataset[f"{kind}_largest"].sel(rail=name).values[one.at]
+        error = absolute_errors(results, f"{kind}_largest", name)
         noun, units = f"the {kind} of {name}", "Pa" if kind == "stress" else "m"
-    off = quantity(one.error * float(largest), units, 2)
+    off = quantity(float(error[one.at]), units, 2)
     when = f", most in doubt at {quantity(one.time, 's')}" if np.isfinite(one.time) else ""
     return f"{noun} (estimated to within {percent(one.error)}, {off},{in_words(results, one.at)}{when})"
 

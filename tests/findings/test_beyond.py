@@ -126,3 +126,28 @@ def test_what_else_is_swept_stands_with_few_parts_or_once_behind_all() -> None:
     assert beyond(1, 3, masses=(2, 2)) == "at 1 and 3 km/h (mass 70 kg)"
     assert beyond(1, 3, masses=(2, 3)) == "at 1 km/h (mass 70 kg) and at 3 km/h (mass 80 kg)"
     assert beyond(1, 3, 5, 7, masses=(2, 2, 1, 2)) == "at 1, 3, 5 and 7 km/h (some of mass 60 kg to 70 kg)"
+
+
+def part_of(values: str, exceeded: list[list[bool]]) -> str:
+    """Where values exceed a limit that do so for these of a number's values and of four masses."""
+    swept = f'speed = {{ of = "carriage.table.motion.speed", {values} }}\n{MASSES}'
+    results = Results.of(scenes.run("passage", swept))
+    return where_beyond(results, np.array(exceeded, dtype=np.float64), 0.5, results.axes[0])
+
+
+def test_not_every_combination_is_told() -> None:
+    """Each mass exceeds it at some speed, and none at all of them."""
+    none, some, full = [False] * 4, [True, True, False, False], [True] * 4
+    three = "values = [1, 2, 3]"
+    assert part_of(three, [none, some, full]) == "from 2 m/s to the end of the sweep, 3 m/s (not with every mass)"
+    assert part_of(three, [some, some, full]) == "everywhere from 1 m/s to 3 m/s (not with every mass)"
+    assert part_of(three, [none, full, full]) == "from 2 m/s to the end of the sweep, 3 m/s"
+
+
+def test_values_that_grow_by_a_factor_are_no_further_apart_where_they_are_large() -> None:
+    """Of a number that is left out between them it is told as before."""
+    none, full = [False] * 4, [True] * 4
+    even = 'from = 1, to = 32, count = 6, spacing = "log"'
+    assert part_of(even, [none, *[full] * 5]) == "from 2 m/s to the end of the sweep, 32 m/s"
+    holed = "values = [1, 2, 3, 4, 11, 12]"
+    assert part_of(holed, [none, *[full] * 5]) == "at 2 to 4 m/s and from 11 m/s to the end of the sweep, 12 m/s"

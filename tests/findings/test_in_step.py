@@ -45,7 +45,7 @@ def found(given: Study, low: float, high: float) -> list[InStep]:
 def with_frequencies(*hertz: float) -> tuple[Study, xr.Dataset]:
     """A train over a body with some frequencies and the shapes of a pinned beam."""
     given = hauled(beam(modes=len(hertz)), **REGULAR)
-    return given, bodies(given).assign(frequency=("mode", list(hertz)))
+    return given, bodies(given).assign(frequency=("body_mode", list(hertz)))
 
 
 def test_axles_at_equal_distances_push_in_step_where_they_come_once_in_some_periods() -> None:
@@ -70,7 +70,7 @@ def test_of_many_the_strongest_are_told() -> None:
         one
         for mode in range(4)
         for low in np.geomspace(1.4, 40.0, 13)[:-1]
-        for one in speeds_in_step(given, "tram", body.isel(mode=[mode]), (low, low * 1.324), given.sensor.values())
+        for one in speeds_in_step(given, "tram", body.isel(body_mode=[mode]), (low, low * 1.324), given.sensor.values())
     ]
     told = speeds_in_step(given, "tram", body, (1.4, 40.0), given.sensor.values())
     assert len(every) > 8 == len(told) and {one.frequency for one in told} <= {2.0, 5.0, 9.0, 30.0}

@@ -68,3 +68,13 @@ def test_double_peaks_say_what_the_start_still_holds_and_how_many_cycles_it_take
     assert f"; {enough} cycles" in told
     assert f"at most {percent(float(np.exp(-rate * 4.0)))} of it" in told
     assert told_unsettled(results_of(swing(0.5, 0.2, 0.5, enough))) == []
+
+
+def test_the_cycles_that_would_be_enough_are_those_of_the_variant_that_needs_most() -> None:
+    """By its own cycles: those of another one, with more of them, would say four times as many."""
+    numbers = {"of": "carriage.car.motion.cycles", "values": [3, 12]}
+    tables = {"kind": "double-peak", "sensor": {"midspan": fixed(0.5)}, "sweep": {"cycles": numbers}}
+    given = study(beam(damping_ratio=ZETA), mass(0.1, swing(0.5, 0.2, 0.5, 3)), **tables)
+    (told,) = told_unsettled(Results.of(studies.run(given)))
+    enough = int(np.ceil(1.0 - np.log(1e-3) / (ZETA * OMEGA / 1.2 * 2.0)))
+    assert told.startswith("In 2 of 2 variants") and f"; {enough} cycles would be enough" in told

@@ -366,3 +366,26 @@ def test_figures(kind: str, sweep: str) -> None:
     assert ("contacts" in names) == (not sweep and kind == "influence")
     for figure in figures:
         assert figure.title and figure.caption and "nan" not in figure.caption
+
+
+def test_of_one_position_nothing_is_said_along_the_way() -> None:
+    found = small.run("eigenfrequencies", "positions = [2.0]\nmodes = 2\nmode_counts = [3, 6]\nunreduced = 1")
+    said, figures = answers.answer(found), {figure.name: figure for figure in answers.figures(found)}
+    lowest = float(found.base_frequency[0, 0])
+    assert said[0] == (
+        f"The two lowest natural frequencies are {lowest:.4g} and {float(found.base_frequency[0, 1]):.4g} Hz with car "
+        "at 2 m."
+    )
+    assert "long the way" not in "\n".join(said) and said[1].startswith("Frequencies 1 and 2 come closest")
+    assert "frequencies up to the 2nd differ by" in "\n".join(said)
+    assert "of the frequencies up to the 2nd, against" in figures["modes"].caption
+    assert figures["frequencies"].title == f"The lowest natural frequency is {lowest:.4g} Hz with car at 2 m"
+    assert "with the carriage where it stands," in figures["shapes"].caption
+
+
+@pytest.mark.parametrize(("error", "words"), [(0.012, "by at most 1.2 %"), (1e-12, "by less than 1e-7 %")])
+def test_rounding_is_no_largest_difference(error: float, words: str) -> None:
+    found = small.run("influence", COMPARED).copy(deep=True)
+    for name in ("middle", "moment"):
+        found[f"{name}_difference"].values[:] = error
+    assert f"readings differ {words} of the sensor's largest" in "\n".join(answers.answer(found))

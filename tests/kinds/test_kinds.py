@@ -110,3 +110,16 @@ def test_amplification_is_largest_over_static() -> None:
     modes = sum(2.0 / (n * np.pi) ** 4 * np.sin(n * np.pi / 2) ** 2 for n in range(1, 2000))
     largest = np.maximum(abs(found.midspan_max), abs(found.midspan_min))
     np.testing.assert_allclose(gain, largest / (weight * 10.0**3 / stiffness * modes), rtol=1e-5)
+
+
+def test_histories_of_different_stations_are_told_as_such() -> None:
+    """Those of the first one are not those of all."""
+    masses = 'mass = { of = "carriage.table.mass", values = [50, 100] }'
+    dataset = scenes.run("trajectory", masses, extra='[output]\nhistories = "all"')
+    count = dataset.sizes["station"]
+    assert f"on {count:,} stations." in "\n".join(studies.answer(dataset))
+    dataset["midspan"].values[1, 100:] = np.nan
+    assert f"on 100 to {count:,} stations." in (said := "\n".join(studies.answer(dataset)))
+    assert said.count(" over all variants") == 2
+    some = scenes.with_failures(dataset, 2)
+    assert "\n".join(studies.answer(some)).count(" over 1 variant with values") == 2

@@ -78,6 +78,14 @@ def test_the_answer_stands_beside_the_paper() -> None:
     assert any("reaches 16.75 m/s²" in sentence and "it is 20." in sentence for sentence in said)
 
 
+def test_another_body_does_not_stand_beside_the_paper() -> None:
+    found = studies.run(paper(0.5))
+    for key, value in {"length": 16.0, "second_moment": 9e-6, "modes": "auto", "supports": "clamped-clamped"}.items():
+        other = paper(0.5, body={"beam": PAPER_BEAM | {key: value}})
+        assert "Hartweg" not in "".join(KIND.findings(Results.of(found, other)))
+    assert "Hartweg" in "".join(KIND.findings(Results.of(found)))
+
+
 def test_a_kind_with_figures() -> None:
     dataset = studies.run(paper())
     names = [figure.name for figure in studies.figures(dataset)]

@@ -193,3 +193,11 @@ def test_errors_while_holding_are_drawn_where_nobody_works(line: Any) -> None:
         own["error_holding"].values[:] = 1e-3
         figure = next(f for f in pictures(Results.of(own)) if f.name == "errors")
         assert figure.drawing.axes[1].get_ylabel().startswith(panel)
+
+
+def test_what_holds_of_the_variants_with_values_is_said_of_no_others(line: Any) -> None:
+    none = np.nan
+    assert answered(line, [0.4, none, 0.4, none])[0].endswith(
+        "by up to 400 µm in all 2 variants with values within 1 %."
+    )
+    assert answered(line, [none, none, 0.4, none])[0].endswith("off their plan by up to 400 µm at acceleration 2.")

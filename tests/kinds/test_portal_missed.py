@@ -13,6 +13,7 @@ from engine.scene.sweep import expand
 from results_schema.status import Status
 from studies.commands.cli import main
 from studies.protocol.study import kind_of
+from studies.results.formatting import quantity
 from studies.results.results import Results
 from studies.robots.tolerance_missed import told_missed
 from tests.robots.scenes import ARM, drive, scene
@@ -90,3 +91,12 @@ def test_what_is_missed_is_told_once(capsys: pytest.CaptureFixture[str], tmp_pat
 def test_nothing_is_told_where_nothing_is_missed() -> None:
     found, sentences = told(lifting(drive(), 6, tolerance=1e-2))
     assert (found["status"] == Status.OK).all() and sentences == []
+
+
+def test_large_errors_are_parts_of_a_true_value_that_is_larger() -> None:
+    """Of half of it, what is told is the other half."""
+    found, _ = told(lifting(drive(), "auto", tolerance=1e-3))
+    found["estimated_error"].loc[{"result": "error of lifter"}] = [0.5, 0.01]
+    largest = max(float(found[f"error_{doing}"][0, 0].fillna(0.0)) for doing in ("moving", "working", "holding"))
+    (text,) = told_missed(Results.of(found))
+    assert f"(estimated to within 50 %, {quantity(largest, 'm', 2)}, at payload 0" in text

@@ -203,7 +203,7 @@ def test_what_has_not_settled_everywhere_is_not_the_same_everywhere(
     )
     (time,) = (one for one in summary.in_tables(Results.of(found)) if one.name == "midspan_settling_time")
     assert time.is_constant and time.partly == "in 1 of 2 variants"
-    screens._ranges([time], [])
+    screens._ranges([time], [], "every variant")
     assert " ".join(capsys.readouterr().out.split()).endswith(
         "The same where there is one: midspan_settling_time 0 s in 1 of 2 variants."
     )
@@ -239,3 +239,12 @@ def test_what_is_left_as_rounding_does_not_swing() -> None:
     assert "quarter: at rest it does not swing." in told and "midspan: at rest it still swings" in told[0]
     figure = drawn(found)["residual"]
     assert len(figure.drawing.axes) == 1 and figure.title.startswith("midspan still swings")
+
+
+def test_of_samples_a_limit_is_exceeded_in_so_many_variants() -> None:
+    """Of no swept number: they lie along none."""
+    swept = {"acceleration": {"of": "carriage.car.motion.acceleration", "from": 2, "to": 30, "sobol": 4}}
+    found = studies.run(stops(sweep=swept, question={"residual": {"displacement": 17e-3}}))
+    found["midspan_residual"].values[:] = [18e-3, 1e-3, 1e-3, 1e-3]
+    (said,) = (text for text in answers.answer(found) if "at rest" in text)
+    assert "it exceeds 17 mm in 1 variant of 4." in said

@@ -8,11 +8,13 @@ import pytest
 import xarray as xr
 
 from results_schema.errors import ArchiveError, BadInput, OutputFailed
+from results_schema.status import Status
 from results_schema.store import files
 from results_schema.store.archive import SCHEMA_VERSION, write_archive
 from studies.reporting import answers
 from studies.reporting.report import PAGE, write_report
-from studies.reporting.summary import Extreme, Range
+from studies.reporting.summary import Extreme, Range, every
+from studies.results.results import Results
 from tests.schema.samples import FailNth
 from tests.studies import scenes
 
@@ -200,3 +202,15 @@ def test_errors_beneath_the_digits_of_a_value_are_not_told() -> None:
 
     found = Range("frequency", "", "Hz", end(3e-7), end(1e-2))
     assert [found.said(one, 4) for one in (found.smallest, found.largest)] == ["31.83 Hz", "31.83 Hz ± 0.01 Hz"]
+
+
+@pytest.mark.parametrize(("lost", "words"), [(0, "every variant"), (2, "all 2 variants with values")])
+def test_what_is_the_same_is_so_in_the_variants_that_have_values(lost: int, words: str, tmp_path: Path) -> None:
+    """Of four, every second one lost."""
+    dataset = scenes.run("passage", scenes.pace("passage"))
+    dataset["midspan_max"].values[:] = 1e-3
+    dataset = scenes.with_failures(dataset, 2) if lost else dataset
+    page = write_report(archive(tmp_path, dataset), tmp_path / "report").read_text(encoding="utf-8")
+    assert f"in {words}" in page.replace("\N{NO-BREAK SPACE}", " ")
+    dataset["status"].values[:3] = Status.DIVERGED
+    assert every(Results.of(dataset)) == "the one variant with values"

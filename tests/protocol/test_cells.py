@@ -209,7 +209,10 @@ def test_every_command_reads_archives_of_cells(here: Path, capsys: pytest.Captur
     assert command(["info", "a.nc"]) == 0
     assert "900" in capsys.readouterr().out
     assert command(["report", "a.nc"]) == 0
-    assert "900 variants range over" in Path("a-report/report.html").read_text(encoding="utf-8")
+    page = Path("a-report/report.html").read_text(encoding="utf-8")
+    assert "900 variants range over" in page
+    varied = page[page.index("What was varied") :].partition("</table>")[0].replace("\N{NO-BREAK SPACE}", " ")
+    assert all(words in varied for words in ("3 values", "300 values", "1 m/s to 9 m/s", "mass", "damping"))
     assert command(["export", "a.nc", "a.csv"]) == 0
     rows = Path("a.csv").read_text(encoding="utf-8").splitlines()
     assert len(rows) == 1 + 3 * open_archive("a.nc").root.sizes["result"] and "smallest_at mass" in rows[0]
@@ -261,7 +264,7 @@ def test_answers_of_cells_begin_with_the_limit_and_judge_it(
         assert first.startswith("quarter_max: from ") and "Its absolute value exceeds " in first
         some = f"in some variants of {'all' if count == 3 else count} of 3 cells" if dims else "in some of the variants"
         assert ("nowhere." in first) if count == 0 else (some in first)
-        last = f", speed {whole.speed.values[order[-1]]:g} m/s."
+        last = f", speed {whole.speed.values[order[-1]]:g} m/s; those whose contact opens count too."
         assert first.endswith(last) == (dims == 1 and count == 1)
     Path("study.toml").write_text(TEXT + KEPT[kept], encoding="utf-8")
     assert command(["run", "study.toml", "-o", "a.nc"]) == 3

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from results_schema.errors import ArchiveError
 from results_schema.store.archive import Archive, open_archive, write_archive
@@ -308,3 +309,21 @@ def test_any_other_number_is_refused_or_told(kind: str, here: Path) -> None:
         codes.append(((group, name, value), main(["report", "small.nc"])))
     assert len(codes) == PICKED
     assert [found for found in codes if found[1] not in (0, 4)] == []
+
+
+def test_bodies_stand_along_dimensions_of_their_own(here: Path) -> None:
+    """By which xarray opens all groups at once; archives of before, whose bodies had those of the results, are read."""
+    write(here, at_rest.text_of("eigenfrequencies"), "rest.toml")
+    assert main(["run", "rest.toml", "-o", "rest.nc"]) == 0
+    with xr.open_datatree("rest.nc") as tree:
+        assert tree["/model/bed"].sizes["body_mode"] == 10 and tree.sizes["mode"] == 8
+    imported.write(here, imported.matrices(here))
+    assert main(["run", "bed.toml", "-o", "own.nc"]) in (0, 3)
+    older = {"body_mode": "mode", "track_position": "position"}
+    changed(
+        "own.nc", lambda datasets, _: datasets.update({"/model/bed": datasets["/model/bed"].rename(older)}), "older.nc"
+    )
+    own, before = (results_of(open_archive(name)) for name in ("own.nc", "older.nc"))
+    assert findings_of(own) == findings_of(before) and before.models["bed"]["mode_shape"].dims == ("mode", "position")
+    for one, other in zip(*(theory.elastic_modes(found, np.array([1.0, 2.0])) for found in (own, before)), strict=True):
+        np.testing.assert_array_equal(one, other)

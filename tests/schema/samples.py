@@ -84,12 +84,13 @@ def groups() -> dict[str, xr.Dataset]:
     )
     model = xr.Dataset(
         {
-            "frequency": ("mode", np.array([1.5, 6.0]), {"units": "Hz", "long_name": "frequency"}),
+            "frequency": ("body_mode", np.array([1.5, 6.0]), {"units": "Hz", "long_name": "frequency"}),
             "length": ((), 15.0, {"units": "m", "long_name": "length"}),
             "mass": ((), 1200.0, {"units": "kg", "long_name": "mass"}),
         }
     )
-    return {"/audit": audit, "/model/bed": model.assign_coords(mode=("mode", [1, 2], axes()["mode"].attributes()))}
+    number = ("body_mode", [1, 2], axes()["body_mode"].attributes())
+    return {"/audit": audit, "/model/bed": model.assign_coords(body_mode=number)}
 
 
 class FailNth(files.Faults):

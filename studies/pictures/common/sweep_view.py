@@ -67,9 +67,9 @@ class View:
     @property
     def thinned(self) -> str:
         """How many points of a sample are drawn; "" where all are."""
-        if not self.is_sampled or self.points.size == self.results.size:
+        if not self.is_sampled or self.x is None or self.points.size == self.x.values.size:
             return ""
-        return f"Drawn: {self.points.size:,} of {self.results.size:,} variants, evenly spread over their numbers."
+        return f"Drawn: {self.points.size:,} of {self.x.values.size:,} samples, evenly spread over their numbers."
 
     def cut(self, values: Any) -> xr.DataArray:
         """Values over (some of) the sweep with the held dimensions taken out."""

@@ -1,0 +1,115 @@
+"""Variants whose contact opens count in no sentence or title beside one that leaves them out, or it is said."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import studies
+from engine.scene.study import Study
+from results_schema.status import Status
+from studies.kinds.double_peak import KIND as DOUBLE_PEAK
+from studies.moving.findings import others, sliding
+from studies.reporting import answers
+from studies.results.results import Results
+from tests.floating.scenes import sliding_mass
+from tests.studies import scenes
+
+OPENED = 2  # of four variants
+
+
+def opened(kind: str, **values: float) -> xr.Dataset:
+    """A study at four paces, of which the third opens and reaches these values, which are 1 in the others."""
+    dataset = scenes.run(kind, scenes.pace(kind))
+    dataset["status"].values[:] = np.where(np.arange(4) == OPENED, Status.SEPARATED, Status.OK)
+    for name, value in values.items():
+        dataset[name].values[:] = 1.0
+        dataset[name].values[OPENED] = value
+    return dataset
+
+
+def test_other_sensors_of_a_passage_are_compared_while_the_contact_holds() -> None:
+    """As the first one is."""
+    assert "Of the other sensors" not in "\n".join(answers.answer(opened("passage", dynamic_amplification=9.0)))
+    dataset = opened("passage", dynamic_amplification=9.0)
+    dataset["dynamic_amplification"].values[0] = 2.0
+    assert "a dynamic amplification of 1.1." in "\n".join(answers.answer(dataset))
+    assert "(up to 2) exceeds" in "\n".join(answers.answer(dataset))
+
+
+def test_a_limit_that_is_exceeded_where_the_contact_opens_alone_is_told() -> None:
+    """And the first sentence says of which variants it is."""
+    dataset = scenes.run("passage", scenes.pace("passage"), extra="[question]\ndisplacement = 0.5")
+    dataset["status"].values[OPENED] = Status.SEPARATED
+    dataset["midspan_max"].values[:] = [0.1, 0.1, 0.9, 0.1]
+    (said,) = (text for text in answers.answer(dataset) if text.startswith("midspan: "))
+    assert said.startswith("midspan: while the contact holds, the largest displacement at 5 m of bed is 100 mm")
+    assert "exceeds 500 mm nowhere from 1 m/s to 8 m/s; it does in 1 of 1 variant whose contact opens." in said
+
+
+def test_a_map_of_amplifications_says_of_which_cells_its_title_is() -> None:
+    mass = 'mass = { of = "carriage.table.mass", from = 100, to = 800, count = 7 }'
+    dataset = scenes.run("passage", f"{scenes.pace('passage', 1.0, 12.0)}\n{mass}")
+    dataset["table_separation_position"].values[:] = np.nan
+    dataset["dynamic_amplification"].values[:] = 1.0 + np.linspace(0.0, 1.0, 28).reshape(4, 7)[..., None]
+    for lost, title in ((False, "is 2 at most"), (True, "is 1.5 at most")):
+        dataset["status"].values[2:] = Status.SEPARATED if lost else Status.OK
+        dataset["dynamic_amplification"].values[1, -1] = 1.5
+        (figure,) = (one for one in answers.figures(dataset) if one.name == "amplification-map")
+        assert figure.title.endswith(title) and ("the map goes on beyond" in figure.caption) == lost
+
+
+def test_double_peaks_count_while_the_contact_holds() -> None:
+    """In sentences, titles, and in what is audited."""
+    dataset = opened("double-peak", dynamic_amplification=9.0, odd_even_ratio=5.0)
+    text = "\n".join(answers.answer(dataset))
+    assert "midspan: while the contact holds, at most as large as the static value" in text
+    assert "midspan: while the contact holds, the two halves of a cycle differ; odd harmonics reach 1 times" in text
+    assert (OPENED,) not in DOUBLE_PEAK.named(Results.of(dataset))
+    figures = {figure.name: figure for figure in answers.figures(dataset)}
+    for name, title in (("amplification", "is up to 1 times the static one"), ("odd-even", "are up to 1 times the")):
+        assert title in figures[name].title and "While the contact holds the title counts" in figures[name].caption
+    dataset["status"].values[:] = Status.OK
+    text = "\n".join(answers.answer(dataset))
+    assert "midspan: at most 9 times the static value" in text and "contact holds" not in text
+
+
+def slid(**values: list[float]) -> Results:
+    """A mass that slides, in two variants, of which the second opens."""
+    swept = {"mass": {"of": "carriage.load.mass", "values": [50.0, 100.0]}}
+    sensor = {"midspan": {"body": "beam", "at": 7.5}}
+    tables = {"sensor": sensor, "sweep": swept, "question": {"duration": 0.5, "displacement": 0.5}}
+    data = sliding_mass().data | {"kind": "moving-frames"} | tables
+    dataset = studies.run(Study(**{key: value for key, value in data.items() if key != "schema_version"}))
+    dataset["status"].values[:] = [Status.OK, Status.SEPARATED]
+    for name, own in values.items():
+        dataset[name].values[:] = own
+    return Results.of(dataset)
+
+
+def test_bodies_in_moving_frames_count_while_the_contact_holds() -> None:
+    """Their readings, limits and contact forces; nothing is said of it where every contact holds."""
+    results = slid(
+        midspan_max=[0.1, 0.9],
+        midspan_min=[0.0, 0.0],
+        load_contact_force_max=[500.0, 9e3],
+        load_contact_force_min=[400.0, -9e3],
+    )
+    way, force = sliding(results)
+    assert way.startswith("load slides from ") and "over all variants" in way
+    assert force == "While the contact holds, its contact force goes from 400 N to 500 N, the largest at mass 50 kg."
+    (reading,) = (text for text in others(results) if text.startswith("midspan"))
+    assert reading.startswith(
+        "midspan: while the contact holds, the displacement goes from 0 m to 100 mm at mass 50 kg."
+    )
+    assert "nowhere from 50 kg to 100 kg; it does in 1 of 1 variant whose contact opens." in reading
+    results.dataset["status"].values[:] = Status.OK
+    held = Results.of(results.dataset)
+    assert "contact holds" not in "\n".join([*sliding(held), *others(held)])
+    assert list(sliding(held))[1].startswith("Its contact force goes from -9 kN to 9 kN")
+
+
+@pytest.mark.parametrize("reason", ["lift off", "over an end of its track"])
+def test_the_status_says_both_reasons_that_it_has(reason: str) -> None:
+    assert reason in Status.SEPARATED.message
