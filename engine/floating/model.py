@@ -269,7 +269,7 @@ def _system(model: FloatingModel) -> System:
         np.array([np.any(body.shapes != 0.0, axis=(0, 2)) for body in model.bodies.values()]).reshape(B, 3),
         np.argwhere(np.abs(pairs).max(axis=3) > ROUNDING),
         False,
-        model.study.start == "equilibrium",
+        model.study.initial == "equilibrium",
     )
 
 

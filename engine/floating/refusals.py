@@ -25,7 +25,7 @@ MOST_CYCLES = 1000  # of a carriage that goes out and back: a variant holds all 
 def refuse_scene(study: Study) -> None:
     """Raise BadInput for what a study has that frames that move do not know."""
     fault = study.source.fault
-    if study.start == "equilibrium":
+    if study.initial == "equilibrium":
         _check_rests(study)
     for name, body in study.body.items():
         if not body.own_weight and study.gravity > 0.0:
