@@ -8,7 +8,7 @@ import numpy as np
 
 from engine.accuracy.grids import SceneGrid
 from engine.batch.plan import Plan
-from engine.batch.unreached import unreached
+from engine.batch.remarks_of_carriages import stays_level, unreached
 from engine.bodies.modal.modal_body import ModalBody
 from engine.model.lane_table import moving_mass, weight
 from engine.observation.signals import build_sensors
@@ -391,4 +391,5 @@ REMARKS = (
     _thin,
     _brief_rest,
     unreached,
+    stays_level,
 )

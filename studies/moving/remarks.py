@@ -210,7 +210,8 @@ def _let_go(looked: Looked) -> Iterator[str]:
     study, model = looked.study, looked.samples[0].model
     joints = [joint for frame in study.frame.values() for joint in frame.joints]
     rests = all(joint.is_held and not joint.told_start for joint in joints)
-    if study.initial == "equilibrium" or not rests or any(carriage.motion.slides for carriage in study.carriage.values()):
+    slides = any(carriage.motion.slides for carriage in study.carriage.values())
+    if study.initial == "equilibrium" or not rests or slides:
         return
     down = {name: E.T[:, Z] for name, E in _attitudes(model).items() if model.bodies[name].omega.size}
     across = [name for name, way in down.items() if study.gravity * np.hypot(way[Y], way[Z]) > ROUNDING * study.gravity]

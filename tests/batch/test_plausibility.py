@@ -24,6 +24,19 @@ def on_portal(**more: Any) -> Study:
     return Study(schema_version=1, kind="passage", body={"portal": PORTAL}, carriage={"car": car})
 
 
+def on_wheels(**front: Any) -> Study:
+    """A bar that lies across, on two wheels at its beginning and one at its end."""
+    wheel = {"at": 0.0, "stiffness": 1e3}
+    contacts = {
+        "rear": wheel | {"offset": -0.1},
+        "front": wheel | {"offset": 0.1} | front,
+        "far": wheel | {"at": 0.5, "offset": 0.0},
+    }
+    bar = {"kind": "rigid", "length": 0.5, "mass": 0.1, "inertia": 0.01}
+    car = {"kind": "body", "on": "bed", "body": "bar", "contacts": contacts, "motion": cruise(0.2, 0.8, 0.5)}
+    return Study(schema_version=1, kind="passage", gravity=0.1, body={"bed": beam(), "bar": bar}, carriage={"car": car})
+
+
 STOP = {"kind": "point-to-point", "start": 0.1, "end": 0.9, "speed": 1.0, "acceleration": 2.0, "dwell": 5.0}
 ON_THREE = beam(supports=[{"at": at, "stiffness": 300.0} for at in (0.0, 0.45, 1.0)])
 LOW = fixed(0.5, "velocity") | {"frequency_limit": "1 Hz"}
@@ -71,6 +84,7 @@ CASES = {
     "lasts 0.25 first periods of the body, so that residual": passing(
         beam(modes=1), mass(0.1, cruise(0.0, 1.0, 0.5, after=0.25)), output={"residual": True}
     ),
+    "does not pitch, as contacts of it hold it at one place of its track: rear and front stay level": on_wheels(),
     "does not act along or across its track: if it did (carriage.car.inertia_along = true": on_portal(),
 }
 
@@ -86,6 +100,7 @@ def test_an_ordinary_study_is_not_remarked() -> None:
     quick = passing(beam(youngs_modulus=1e8), car=mass(0.1, cruise(0.0, 1.0, 145.0)))
     assert not any("at speeds up to" in remark for remark in remarks(make_plan(quick)))
     assert remarks(make_plan(on_portal(inertia_along=True, inertia_across=True))) == []
+    assert remarks(make_plan(on_wheels(at=0.2))) == []
 
 
 STRAIGHT = {
