@@ -32,8 +32,8 @@ class Quantity:
     a uniform beam tell by its name. needs_fibre: it needs the fibre distance. of_mass: a sprung mass has it as well.
     of_contact: no motion, but the force between a carriage and its body. of_support: no motion, but what a support
     carries; turns: its moment about a direction. of_arm: no deflection of its body, but how far a point is from where
-    the rigid arm would have it, whose joints are where their motions say. told: its error makes no status, as forces
-    that enter excite every mode. meant: other words for it.
+    the rigid arm would have it, whose joints are where their motions say. of_drive: what the drive of a joint of its
+    body exerts. told: its error makes no status, as forces that enter excite every mode. meant: other words for it.
     """
 
     name: str
@@ -48,6 +48,7 @@ class Quantity:
     of_support: bool = False
     turns: bool = False
     of_arm: bool = False
+    of_drive: bool = False
     told: bool = False
     meant: tuple[str, ...] = ()
 
@@ -73,6 +74,8 @@ def _stress(section: UniformSection) -> float:
 _ROWS = (
     Quantity("displacement", "m", of_mass=True, meant=("deflection",)),
     Quantity("position_error", "m", of_arm=True, meant=("tip-error", "path-error", "deviation", "tracking-error")),
+    Quantity("drive_torque", "N m", of_drive=True, told=True, meant=("torque", "joint-torque", "motor-torque")),
+    Quantity("drive_force", "N", of_drive=True, told=True, meant=("joint-force", "motor-force")),
     Quantity("velocity", "m s-1", rate=1, of_mass=True, told=True),
     Quantity("acceleration", "m s-2", rate=2, of_mass=True, told=True),
     Quantity("bending_moment", "N m", 2, factor=_bending, of_section=True, meant=("moment",)),
@@ -88,7 +91,7 @@ _ROWS = (
 
 def _missing(piece: Any) -> list[str]:
     """What bodies, carriages and arms tell by name is the program's own."""
-    own = ("of_section", "of_contact", "of_support", "of_arm")
+    own = ("of_section", "of_contact", "of_support", "of_arm", "of_drive")
     return no_row_of(Quantity)(piece) or [f"{key} = False" for key in own if getattr(piece, key)]
 
 

@@ -266,6 +266,7 @@ def _system(model: FloatingModel) -> System:
         tips.tips,
         tips.places,
         tips.carrying,
+        _drives(model),
         np.array([np.any(body.shapes != 0.0, axis=(0, 2)) for body in model.bodies.values()]).reshape(B, 3),
         np.argwhere(np.abs(pairs).max(axis=3) > ROUNDING),
         False,
@@ -339,6 +340,17 @@ def _ends(model: FloatingModel, n: int) -> Array:
     return found
 
 
+def _drives(model: FloatingModel) -> Counts:
+    """(D, 2) sensors of drives, and their joints."""
+    places = [(joint.body, joint.number) for joint in model.joints]
+    found = []
+    for number, sensor in enumerate(model.study.sensor.values()):
+        if sensor.reads.of_drive:
+            on = str(sensor.body)
+            found.append((number, places.index((on, model.frame(on).driven(sensor.joint)[0]))))
+    return np.array(found, dtype=np.int64).reshape(-1, 2)
+
+
 def _readings(model: FloatingModel) -> tuple[Array, Counts]:
     """Rows of the sensors and of what tells how far bodies bend, and under which carriage they read, in which
     direction, by which rate."""
@@ -352,7 +364,7 @@ def _readings(model: FloatingModel) -> tuple[Array, Counts]:
         name = str(sensor.body)
         body, quantity = model.bodies[name], sensor.reads
         under.append((-1, Z, quantity.rate))
-        if body.omega.size and not quantity.of_arm:
+        if body.omega.size and not (quantity.of_arm or quantity.of_drive):
             first = model.first[name]
             row[first : first + body.omega.size] = body.reading(quantity, sensor.at)
     depths = _depths(model)
@@ -363,7 +375,8 @@ def _readings(model: FloatingModel) -> tuple[Array, Counts]:
 def _smooth(model: FloatingModel) -> Counts:
     """Signals that go on as smoothly as coordinates do: what sensors read of these, also after stops, and places along
     tracks of what slides by itself: given motions may stop at an instant, over which a parabola would pass."""
-    sensors = [number for number, sensor in enumerate(model.study.sensor.values()) if not sensor.reads.rate]
+    read = model.study.sensor.values()
+    sensors = [n for n, sensor in enumerate(read) if not (sensor.reads.rate or sensor.reads.of_drive)]
     first = model.signal_of("carriages")
     places = [first + OF_CARRIAGE * c for c, name in enumerate(model.study.carriage) if name in model.places]
     stops = [model.signal_of("stops") + t for t in range(len(model.tips))]

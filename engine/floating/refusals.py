@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from engine.floating.elastic import ABOUT_X, Z
-from engine.scene.frames import GROUND, Free
+from engine.scene.frames import GROUND, Frame, Free
 
 if TYPE_CHECKING:
     from engine.floating.model import FloatingModel
@@ -84,8 +84,25 @@ def _check_sensor(study: Study, name: str, sensor: Sensor) -> None:
         raise fault(here, "this place is not read in frames that move", expected="at, or under")
     if sensor.frequency_limit is not None:
         raise fault(f"{here}.frequency_limit", "sensors in frames that move read all modes", expected="no such key")
+    if sensor.reads.of_drive:
+        _check_drive(study, name, sensor)
     if sensor.under is not None and sensor.quantity != "displacement":
         _refuse_of_carriage(study, here, sensor.quantity, sensor.under, UNDER_CARRIAGE)
+
+
+def _check_drive(study: Study, name: str, sensor: Sensor) -> None:
+    """Refuse a drive that is not there, or of a joint that moves otherwise."""
+    fault, on = study.source.fault, str(sensor.body)
+    found = (study.frame.get(on) or Frame()).driven(sensor.joint)
+    if len(found) != 1:
+        number = "" if sensor.joint is None else f" {sensor.joint}"
+        what = f"the joint{number} of {on} whose drive this reads is not one with a motion"
+        expected = f"joint: a number of frame.{on}.joints, from 0 on, which has a motion"
+        raise fault(f"sensor.{name}.joint", what, expected=expected, received=f"{len(found)} such")
+    wanted = "drive_torque" if study.frame[on].joints[found[0]].turns else "drive_force"
+    if sensor.quantity != wanted:
+        what = f"frame.{on}.joints.{found[0]} {'turns' if wanted == 'drive_torque' else 'slides'}"
+        raise fault(f"sensor.{name}.quantity", what, expected=wanted, received=sensor.quantity)
 
 
 def _refuse_of_carriage(study: Study, here: str, quantity: str, carriage: str, known: Mapping[str, str]) -> None:

@@ -203,6 +203,10 @@ class Frame(Spec):
         """Whether it is fixed over the ground."""
         return self.on == GROUND and not self.joints
 
+    def driven(self, joint: int | None) -> list[int]:
+        """The numbers of its joints that have a motion, or of these the one that is asked for."""
+        return [k for k, own in enumerate(self.joints) if own.is_told and joint in (None, k)]
+
     @model_validator(mode="after")
     def _fitting_keys(self) -> Frame:
         if self.on == GROUND and self.at is not None:

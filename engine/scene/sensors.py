@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,11 @@ def _along_a_body(word: str) -> str:
 
 def quantities_of_a_body() -> list[str]:
     """The quantities that can be read of bodies, whether their frames move or not."""
-    return [name for name, quantity in QUANTITIES.items() if not (quantity.of_contact or quantity.of_arm)]
+    return [
+        name
+        for name, quantity in QUANTITIES.items()
+        if not (quantity.of_contact or quantity.of_arm or quantity.of_drive)
+    ]
 
 
 OwnTolerance = Annotated[
@@ -72,12 +76,22 @@ def _check_error(sensor: Sensor) -> None:
         raise fault(what, expected='body = "a body" and at = metres along its track')
 
 
+def _check_drive(sensor: Sensor) -> None:
+    if sensor.joint is not None and not sensor.reads.of_drive:
+        raise fault("only drives are read at a joint", expected='quantity = "drive_torque" or "drive_force"')
+    if sensor.reads.of_drive and sensor.fixed_place != 0.0:
+        raise fault(
+            f"a {sensor.quantity} is that of a joint of a body", expected='body = "a body" alone, or with joint'
+        )
+
+
 class Sensor(Spec):
     """A quantity at a fixed place `at` (m along the track) of a body, at a node, a point, or a place of a member (`at`
     m from its first node) in a direction (along gravity unless given), at the point that a carriage touches (`under`),
     of a carriage's own sprung mass (`carriage`), the contact force of a carriage (of a body that rides, that at one
-    `contact`), what a support at a place of a beam or at a node carries (its moment at a node alone), or how far a
-    place of a track is from where the rigid arm would have it (the length of that, or in a direction over the ground).
+    `contact`), what a support at a place of a beam or at a node carries (its moment at a node alone), how far a
+    place of a track is from where the rigid arm would have it (the length of that, or in a direction over the ground),
+    or what the drive of a `joint` of its body exerts (by number; the only one with a motion if not given).
 
     With `under` or `carriage`, the body is that of the carriage and need not be named. tolerance: of its own, in place
     of `solver.tolerance`; "told": its error is told and makes no status, as for velocities, accelerations and contact
@@ -95,10 +109,18 @@ class Sensor(Spec):
     under: str | None = None
     carriage: str | None = None
     contact: str | None = None
+    joint: int | None = Field(default=None, ge=0)
     quantity: Annotated[str, AfterValidator(one_of(more=QUANTITIES, meant=MEANT))] = "displacement"
     tolerance: OwnTolerance | None = None
     frequency_limit: Limit | None = None
     settling_band: Band | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _at_its_joint(cls, data: Any) -> Any:
+        """A joint is where the track of its body begins."""
+        quantity = QUANTITIES.get(str(data.get("quantity"))) if isinstance(data, dict) else None
+        return {"at": 0.0} | data if quantity is not None and quantity.of_drive else data
 
     @model_validator(mode="after")
     def _one_place(self) -> Sensor:
@@ -115,6 +137,7 @@ class Sensor(Spec):
         _check_moment(self)
         _check_band(self)
         _check_error(self)
+        _check_drive(self)
         if self.direction is not None and not self.reads.of_arm and self.node is None and self.member is None:
             of_arm = 'without direction; where frames move quantity = "position_error" has one'
             remedy = "a node with direction where the carriage stops" if self.under is not None else of_arm

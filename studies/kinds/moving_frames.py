@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from engine.scene.study import Study
-from engine.study_file.units import Length, Time
+from engine.study_file.units import Force, Length, Time, Torque
 from results_schema.arrays import Array, Counts
 from results_schema.lazy_imports import xr
 from results_schema.variables import declare
@@ -30,6 +30,8 @@ class Question(Limits):
 
     duration: Time = Field(gt=0)
     position_error: Annotated[Length, Field(gt=0)] | None = None
+    drive_torque: Annotated[Torque, Field(gt=0)] | None = None
+    drive_force: Annotated[Force, Field(gt=0)] | None = None
 
 
 def _duration(study: Study) -> Callable[[Mapping[str, Array], int], Array]:

@@ -213,8 +213,11 @@ def _let_go(looked: Looked) -> Iterator[str]:
     slides = any(carriage.motion.slides for carriage in study.carriage.values())
     if study.initial == "equilibrium" or not rests or slides:
         return
-    down = {name: E.T[:, Z] for name, E in _attitudes(model).items() if model.bodies[name].omega.size}
-    across = [name for name, way in down.items() if study.gravity * np.hypot(way[Y], way[Z]) > ROUNDING * study.gravity]
+    across = []
+    for name, E in _attitudes(model).items():
+        bends = np.any(model.bodies[name].shapes != 0.0, axis=(0, 2)) & [False, True, True]
+        if study.gravity and (np.abs(E[Z][bends]) > ROUNDING).any():
+            across.append(name)
     if across:
         yield (
             f"{' and '.join(across)} {'starts' if len(across) == 1 else 'start'} undeformed, so that weight sets "

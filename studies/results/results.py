@@ -179,6 +179,8 @@ class Results:
             sprung = own.reads.of_mass and self.study.carriage[own.rides].suspension is not None
             of = "of the sprung mass of" if sprung else "of"
             return f"{spot}{'under' if own.under else of} {own.rides}"
+        if own.reads.of_drive:
+            return f"of {own.body}" if own.joint is None else f"of joint {own.joint} of {own.body}"
         if own.at is None:
             return f"at {own.node or own.point}{own.way_in_words}"
         swept = any(f"sensor.{sensor}.at" in axis.paths for axis in self.axes)

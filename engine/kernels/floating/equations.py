@@ -21,7 +21,6 @@ from engine.kernels.floating.layout import (
     PARENT,
     PRISMATIC,
     RESTS,
-    REVOLUTE,
     SPHERICAL,
     STIFFENS,
     TURNED,
@@ -45,6 +44,7 @@ from engine.kernels.floating.work import (
     HANGING,
     HANGING_PLACE,
     HANGING_TURNED,
+    JOINT_DRIVE,
     JOINT_SHIFT,
     JOINT_TURNED,
     TORQUE,
@@ -85,8 +85,10 @@ def gather(system, lane, b, x, work, out):
     F, T = vector(work.frames, b, FORCE), vector(work.frames, b, TORQUE)
     for j in range(system.tree[b, END_JOINT] - 1, system.tree[b, FIRST_JOINT] - 1, -1):
         k, kind = system.joint_table[j, COORDINATE], system.joint_table[j, KIND]
+        own = dot(shared_vector(system.axes, j, 0), F if kind == PRISMATIC else T)
+        put_lanes(work.joints, (j, JOINT_DRIVE), own)
         if k >= 0:
-            joint_forces(system, lane, j, x, work, (F, T), out)
+            joint_forces(system, lane, j, x, work, (own, T), out)
         if kind == PRISMATIC:
             T = add(T, cross(vector(work.joints, j, JOINT_SHIFT), F))
         else:
@@ -112,9 +114,9 @@ def gather(system, lane, b, x, work, out):
 
 @called
 def joint_forces(system, lane, j, x, work, wrench, out):
-    """What the coordinates of a joint need of the force and torque behind it, and its spring and damper about 0 or
-    about a motion."""
-    F, T = wrench
+    """What the coordinates of a joint need of the force or torque about its axis and of all three behind it, and its
+    spring and damper about 0 or about a motion."""
+    own, T = wrench
     k, kind, m = system.joint_table[j, COORDINATE], system.joint_table[j, KIND], system.joint_table[j, MOTION]
     stiffness, damping = lanes_at(lane.joints, (j, 0)), lanes_at(lane.joints, (j, 1))
     if kind == SPHERICAL:
@@ -124,5 +126,4 @@ def joint_forces(system, lane, j, x, work, wrench, out):
     value, rate = lanes_at(x.y, (k,)), lanes_at(x.u, (k,))
     if m >= 0:
         value, rate = value - lanes_at(work.motions, (m, 0)), rate - lanes_at(work.motions, (m, 1))
-    own = dot(shared_vector(system.axes, j, 0), T if kind == REVOLUTE else F)
     add_to(out, k, own + stiffness * value + damping * rate)

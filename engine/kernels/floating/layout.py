@@ -70,6 +70,7 @@ class System(NamedTuple):
     have extremes between stations.
     tips (T, 2), tip_places (T, 6 + 3 n): places whose distance from the rigid arm is read; carrying (L): the bodies of
     these arms, each after its parent.
+    drives (D, 2): sensors that read what drives exert, and their joints.
     leans (B, 3): whether a body's modes move it along its x, y and z; pairing (K, 3): bodies, and two of their modes
     that act on each other. given: whether steps take frames and places of carriages as given in time, and need no
     iteration. settles: whether marches begin in static equilibrium.
@@ -100,6 +101,7 @@ class System(NamedTuple):
     tips: IntArray
     tip_places: FloatArray
     carrying: IntArray
+    drives: IntArray
     leans: BoolArray
     pairing: IntArray
     given: bool

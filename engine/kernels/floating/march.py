@@ -137,6 +137,8 @@ def go_on(system, lane, scheme, who, end, state, solver):
         step(system, lane, scheme, goes, end - start, state, solver)
     arrived = goes & sound(memory)
     take(arrived, state, scheme)
+    if system.given and system.drives.size:
+        residual(system, lane, state.now, solver.work, solver.other)
     put_where(arrived, memory, (TIME,), end)
 
 

@@ -47,7 +47,17 @@ from engine.kernels.floating.vectors import (
     turned_out,
     vector,
 )
-from engine.kernels.floating.work import ATTITUDE, CONTACT, POSITION, SPIN, TOUCHED, VELOCITY, add_to, three_at
+from engine.kernels.floating.work import (
+    ATTITUDE,
+    CONTACT,
+    JOINT_DRIVE,
+    POSITION,
+    SPIN,
+    TOUCHED,
+    VELOCITY,
+    add_to,
+    three_at,
+)
 from engine.kernels.jit import called
 from engine.kernels.vector import all_lanes, choose, lanes_at, put_lanes, root
 
@@ -78,6 +88,8 @@ def observe(system, lane, x, work, by, out):
             d = add(d, times(moved, shared_vector(system.points, p, 3 + 3 * i)))
         keep(out, first, over_ground(work.frames, b, d))
         first += OF_POINT
+    for d in range(system.drives.shape[0]):
+        put_lanes(out, (system.drives[d, 0],), lanes_at(work.joints, (system.drives[d, 1], JOINT_DRIVE)))
     for k in range(system.carrying.size):
         follow_rigid(system, system.carrying[k], work)
     for t in range(system.tips.shape[0]):

@@ -16,8 +16,8 @@ from engine.kernels.vector import lanes_at, put_lanes
 ATTITUDE, POSITION, VELOCITY, SPIN, ACCELERATION, ANGULAR, FORCE, TORQUE = 0, 9, 12, 15, 18, 21, 24, 27
 HANGING_PLACE, HANGING, HANGING_TURNED, FRAME = 30, 33, 36, 45
 RIGID = 12  # of Work.rigid: attitude and position alone
-# columns of Work.joints: its rotation, or its shift
-JOINT_TURNED, JOINT_SHIFT, JOINT = 0, 9, 12
+# columns of Work.joints: its rotation, or its shift; the torque or force about or along its axis behind it
+JOINT_TURNED, JOINT_SHIFT, JOINT_DRIVE, JOINT = 0, 9, 12, 13
 # columns of Work.contacts: force of the track on a carriage, and acceleration of the point that it touches less gravity
 CONTACT, TOUCHED, CONTACTS = 0, 3, 6
 # columns of Work.turning: of a frame that is given, what rates and values of a place do to its acceleration, and both

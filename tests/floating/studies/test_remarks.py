@@ -81,5 +81,7 @@ def test_nothing_is_remarked_of_ordinary_studies() -> None:
     about_z = TURN | {"axis": [0, 0.1, 1]}
     assert KIND.remarks(driven(sensor={"side": ASIDE}, joints=[about_z, TURN])) == ()
     assert KIND.remarks(heavy(initial="equilibrium")) == ()
+    aside = {"joints": [TURN | {"axis": [0, 0, 1]}], "turned": ["90 deg", 0, 0]}
+    assert KIND.remarks(heavy(frame={"arm": aside})) == ()
     assert KIND.remarks(heavy(frame={"arm": {"joints": [TURN], "turned": [0, "90 deg", 0]}})) == ()  # upright
     assert len(REMARKS) == 9

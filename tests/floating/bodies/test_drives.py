@@ -1,0 +1,108 @@
+"""What drives of joints exert: closed forms, power beside energy, equilibrium, and what is refused."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from engine.scene.study import Study
+from results_schema.errors import BadInput
+from studies.protocol.study import kind_of
+from tests.floating.scenes import ARM, history, steps
+
+GRAVITY, MASS, LENGTH, INERTIA = 9.81, 3.0, 0.8, 0.2
+RIGID = {"kind": "rigid", "length": LENGTH, "mass": MASS, "inertia": INERTIA, "own_weight": True}
+SWING: dict[str, Any] = {"kind": "swing", "centre": 0.4, "amplitude": 0.5, "frequency": 0.7}
+TURNS: dict[str, Any] = {"kind": "revolute", "axis": [0, 1, 0]}
+SLIDES: dict[str, Any] = {"kind": "prismatic", "axis": [0, 0, 2]}
+TORQUE, FORCE = {"body": "arm", "quantity": "drive_torque"}, {"body": "arm", "quantity": "drive_force"}
+
+
+def driven(joints: list[dict[str, Any]], sensor: dict[str, Any], body: Any = None, **tables: Any) -> Study:
+    return Study(
+        kind="moving-frames",
+        body={"arm": body or RIGID, "beside": ARM | {"modes": 1, "own_weight": True}} | tables.pop("bodies", {}),
+        frame={"arm": {"joints": joints}} | tables.pop("frames", {}),
+        sensor={"drive": sensor},
+        question={"duration": 2.0},
+        **({"gravity": GRAVITY} | tables),
+    )
+
+
+def swung(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The angle and its acceleration."""
+    w = 2.0 * np.pi * 0.7
+    return 0.4 + 0.5 * np.sin(w * t), -0.5 * w * w * np.sin(w * t)
+
+
+def test_a_drive_swings_a_rigid_arm_against_its_weight() -> None:
+    """(I + m l^2) angle'' - m g l cos(angle), about y with z down: where the arm points down it is pulled on."""
+    model, marched = steps(driven([TURNS | {"motion": SWING}], TORQUE), 2.0, 400)
+    angle, change = swung(marched.times[0])
+    half = 0.5 * LENGTH
+    wanted = (INERTIA + MASS * half**2) * change + MASS * GRAVITY * half * np.cos(angle)
+    assert history(model, marched, "sensors")[:, 0] == pytest.approx(wanted, abs=1e-9)
+
+
+def test_a_drive_lifts_what_it_carries() -> None:
+    """m (z'' - g) along z, which points down, whatever the length of the axis that is written."""
+    model, marched = steps(driven([SLIDES | {"motion": SWING}], FORCE), 2.0, 400)
+    _, change = swung(marched.times[0])
+    assert history(model, marched, "sensors")[:, 0] == pytest.approx(MASS * (change - GRAVITY), abs=1e-9)
+
+
+@pytest.mark.parametrize("carried", [{}, {"stiffness": 5e3}], ids=["given", "controlled"])
+def test_the_power_of_a_drive_is_the_change_of_energy(carried: dict[str, Any]) -> None:
+    """Of an arm that bends with a body at its end and a trolley on it: order 2. A controller's spring is part of
+    that energy, and its other end moves as it is told."""
+    arm = ARM | {"own_weight": True, "modes": 3, "second_moment": 2e-6}
+    tool = {"kind": "rigid", "length": 0.3, "mass": 0.5, "inertia": 0.01, "own_weight": True}
+    way = {"kind": "waypoints", "times": [0, 1], "positions": [4.0, 4.0]}
+    study = driven(
+        [TURNS | carried | {"motion": SWING}],
+        TORQUE,
+        arm,
+        bodies={"tool": tool},
+        frames={"tool": {"on": "arm"}},
+        carriage={"trolley": {"kind": "mass", "on": "arm", "mass": 1.0, "motion": way}},
+    )
+    gaps = []
+    for count in (8000, 16000):
+        model, marched = steps(study, 2.0, count)
+        w = 2.0 * np.pi * 0.7
+        power = history(model, marched, "sensors")[:, 0] * 0.5 * w * np.cos(w * marched.times[0])
+        work = np.concatenate([[0.0], np.cumsum(0.5 * (power[1:] + power[:-1])) * (2.0 / count)])
+        energy = history(model, marched, "whole", 0, 2).sum(axis=1)
+        gaps.append(np.abs(energy - energy[0] - work).max() / np.ptp(energy))
+    assert gaps[1] < 1e-4
+    assert np.log2(gaps[0] / gaps[1]) == pytest.approx(2.0, abs=0.3)
+
+
+def test_a_controller_holds_the_weight_of_what_it_carries() -> None:
+    still = {"kind": "waypoints", "times": [0, 1], "values": [0.3, 0.3]}
+    study = driven([TURNS | {"motion": still, "stiffness": 1e9}], TORQUE, initial="equilibrium")
+    model, marched = steps(study, 0.1, 10)
+    wanted = -MASS * GRAVITY * 0.5 * LENGTH * np.cos(0.3)
+    assert np.abs(history(model, marched, "sensors")[:, 0]) == pytest.approx(abs(wanted), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("joints", "sensor", "words"),
+    [
+        ([TURNS], TORQUE, r"sensor\.drive\.joint: the joint of arm whose drive this reads is not one with a motion"),
+        ([TURNS | {"motion": SWING}], TORQUE | {"joint": 1}, "the joint 1 of arm"),
+        ([TURNS | {"motion": SWING}] * 2, TORQUE, "received 2 such"),
+        ([TURNS | {"motion": SWING}], FORCE, r"joints\.0 turns; expected drive_torque, received drive_force"),
+        ([SLIDES | {"motion": SWING}], TORQUE, r"joints\.0 slides"),
+    ],
+)
+def test_drives_that_are_not_there_are_refused(joints: Any, sensor: Any, words: str) -> None:
+    study = driven(joints, sensor)
+    with pytest.raises(BadInput, match=words):
+        kind_of(study).parts(study)
+
+
+@pytest.mark.parametrize("sensor", [TORQUE | {"at": 0.5}, {"body": "arm", "at": 0.1, "joint": 0}])
+def test_sensors_of_drives_have_a_joint_and_no_place(sensor: Any) -> None:
+    with pytest.raises(BadInput, match="joint"):
+        driven([TURNS | {"motion": SWING}], sensor)
