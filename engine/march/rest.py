@@ -46,7 +46,8 @@ def counts_settling(tables: SceneTables) -> Counts:
 
 def settling_times(tables: SceneTables, values: VariantValues, counts: Counts, history: Array) -> dict[str, Array]:
     """How long after all carriages have come to rest or left a sensor is off its static value by more than its band,
-    s; NaN where it still is at the end. history (H, J, V) of the sensors at stations by their count."""
+    s; NaN where it still is within a period before the end, as it may swing out of it again. history (H, J, V) of the
+    sensors at stations by their count."""
     own, found = counts_settling(tables), dict[str, Array]()
     if not own.size:
         return found
@@ -54,8 +55,17 @@ def settling_times(tables: SceneTables, values: VariantValues, counts: Counts, h
     for j, (name, static) in enumerate(zip(tables.model.study.sensor, _static(tables, values), strict=True)):
         band = tables.model.study.sensor[name].settling_band
         if band is not None:
-            found[f"{name}_settling_time"] = last_beyond(np.abs(readings[:, j] - static), band, seconds - seconds[0])
+            when = last_beyond(np.abs(readings[:, j] - static), band, seconds - seconds[0])
+            swings_on = (when > 0.0) & (seconds[-1] - seconds[0] - when < _longest_period(tables, name))
+            found[f"{name}_settling_time"] = np.where(swings_on, np.nan, when)
     return found
+
+
+def _longest_period(tables: SceneTables, sensor: str) -> float:
+    """s, of the modes of the body of a sensor; 0 where it does not bend."""
+    body = tables.model.study.body_of(sensor)
+    omega = next(part.modal.omega for part in tables.model.bodies if part.name == body)
+    return float(2.0 * np.pi / omega[omega > 0.0].min()) if (omega > 0.0).any() else 0.0
 
 
 def last_beyond(off: Array, band: float, seconds: Array) -> Array:

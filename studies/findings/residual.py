@@ -132,5 +132,6 @@ def _settled(results: Results, sensor: str) -> str:
         when = f"{quantity(took, 's')}{told_error(error, took, 's')} after the stop at the latest"
         said.append(f"{among}it has settled {within} {when}{in_words(results, place)}")
     if left:
-        said.append(f"{counted(left, 'variant')} {'have' if left > 1 else 'has'} not settled by the end of the run")
+        have = "have" if left > 1 else "has"
+        said.append(f"{counted(left, 'variant')} {have} not settled by the end of the run: a longer rest tells when")
     return "".join(f"; {one}" for one in said)
