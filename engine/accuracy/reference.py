@@ -258,10 +258,11 @@ def _by(grid: SceneGrid, values: VariantValues, levels: Levels, level: int) -> C
     if levels.steps == "as the study says":
         return np.ones(values.size, dtype=np.int64)
     model = grid.model(levels.numerics[level])
-    alike = sum(grid.model(before).body_modes == model.body_modes for before in levels.numerics[:level])
     # Of steps that the study fixes twice as many each time: levels that all took its own would not tell their error.
     wanted = np.full(values.size, max(unit_steps(grid.scene) * 4.0**level, grid.unit * 2.0**level))
-    own = MARGIN * least_steps(model, values) * 2.0**alike  # no two levels are the same march
+    own = MARGIN * least_steps(model, values)
+    if level:  # what few modes decide tells of steps alone, also where the last modes are hardly more than those before
+        own = np.maximum(own, 2.0 * grid.unit * _by(grid, values, levels, level - 1))
     if not np.isfinite(model.scheme.stability_limit):
         periods = values.scene_time_scale * model.first_omega / (2.0 * np.pi)
         own = np.maximum(own, FIRST_PERIODS * 4.0**level * periods)

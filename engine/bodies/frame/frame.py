@@ -273,6 +273,10 @@ class Frame(Body):
         return (DIRECTIONS[across], *(f"r{DIRECTIONS[axis]}" for axis in PLANES[self.plane]))
 
     @property
+    def is_meshed(self) -> bool:
+        return True
+
+    @property
     def modes_are_open(self) -> bool:
         return self.modes == "auto" and not (self.interface or self.leave_out)
 

@@ -227,6 +227,11 @@ class Body(SpecOfKind):
         return ""
 
     @property
+    def is_meshed(self) -> bool:
+        """Whether the study says into how many elements it is cut."""
+        return False
+
+    @property
     def modes_are_open(self) -> bool:
         """Whether the number of its modes is chosen by the tolerance."""
         return False
