@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from engine.kernels.robots.layout import MOVE, START
-from engine.scene.motions.point_to_point import Profile, profile
+from engine.scene.motions.profile import Profile, profile
 from engine.scene.robots import Drive
 from results_schema.arrays import Array
 

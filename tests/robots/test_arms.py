@@ -5,7 +5,7 @@ import pytest
 
 from engine.robots.model import build
 from engine.robots.plans import plans_of
-from engine.scene.motions.point_to_point import profile
+from engine.scene.motions.profile import profile
 from engine.scene.robots import Arm
 from tests.naive.robots_as_particles import driven_by, pieces, told
 from tests.robots.inverse import drive_forces

@@ -4,14 +4,29 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable
-from math import pi
+from math import inf, pi
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, create_model, model_validator
 
+from engine.scene.motions.profile import DEGREE, PHASES, profile
 from engine.study_file.spec import KindOf, Several, SpecOfKind, kinds
-from engine.study_file.units import Angle, AngularRate, Dimensionless, Frequency, Length, Rate, Speed, Time, fault
+from engine.study_file.units import (
+    Acceleration,
+    Angle,
+    AngularAcceleration,
+    AngularJerk,
+    AngularRate,
+    Dimensionless,
+    Frequency,
+    Jerk,
+    Length,
+    Rate,
+    Speed,
+    Time,
+    fault,
+)
 from results_schema.arrays import Array
 
 #: Columns of a piece: start (s); coefficients of a polynomial of degree 5 in the time since then, constant first;
@@ -36,9 +51,10 @@ class TimeMotion(SpecOfKind):
         return float(piece[CONSTANT] + piece[AMPLITUDE] * np.sin(piece[PHASE]))
 
     def _number(self, key: str) -> Array:
-        """(1,) a number of its own, such as "values.2"."""
+        """(1,) a number of its own, such as "values.2"; 0 where none is set."""
         name, _, place = key.partition(".")
-        return np.array([float(getattr(self, name)[int(place)] if place else getattr(self, name))])
+        found = getattr(self, name)[int(place)] if place else getattr(self, name)
+        return np.array([0.0 if found is None else float(found)])
 
 
 def blank(like: Array, count: int) -> Array:
@@ -92,6 +108,21 @@ class SpinUp(TimeMotion):
         return found
 
 
+class Move(TimeMotion):
+    """From rest at the start to rest at the end as fast as limits of speed, acceleration and jerk allow; it stays there
+    (`engine.scene.motions.profile`). Without a jerk the speed is a trapezoid."""
+
+    kind: Literal["point-to-point"]
+    start: Dimensionless = 0.0
+    end: Dimensionless
+    speed: Dimensionless = Field(gt=0)
+    acceleration: Dimensionless = Field(gt=0)
+    jerk: Dimensionless | None = Field(default=None, gt=0)
+
+    def pieces(self, number: Number) -> Array:
+        return move_pieces(number)
+
+
 class Points(TimeMotion):
     """The C2 cubic spline through values at times, at rest at both ends; it stays at the last."""
 
@@ -121,19 +152,52 @@ def _of_a_joint(base: type[TimeMotion], way: Literal["Turn", "Slide"], **fields:
 SteadyTurn = _of_a_joint(Steady, "Turn", start=(Angle, 0.0), rate=(AngularRate, ...))
 SwingTurn = _of_a_joint(Swing, "Turn", centre=(Angle, 0.0), amplitude=(Angle, ...))
 SpinUpTurn = _of_a_joint(SpinUp, "Turn", rate=(AngularRate, ...))
+MoveTurn = _of_a_joint(
+    Move,
+    "Turn",
+    start=(Angle, 0.0),
+    end=(Angle, ...),
+    speed=(Annotated[AngularRate, Field(gt=0)], ...),
+    acceleration=(Annotated[AngularAcceleration, Field(gt=0)], ...),
+    jerk=(Annotated[AngularJerk, Field(gt=0)] | None, None),
+)
 PointsTurn = _of_a_joint(Points, "Turn", values=(Annotated[Several[Angle], TWO_OR_MORE], ...))
 SteadySlide = _of_a_joint(Steady, "Slide", start=(Length, 0.0), rate=(Speed, ...))
 SwingSlide = _of_a_joint(Swing, "Slide", centre=(Length, 0.0), amplitude=(Length, ...))
 SpinUpSlide = _of_a_joint(SpinUp, "Slide", rate=(Speed, ...))
+MoveSlide = _of_a_joint(
+    Move,
+    "Slide",
+    start=(Length, 0.0),
+    end=(Length, ...),
+    speed=(Annotated[Speed, Field(gt=0)], ...),
+    acceleration=(Annotated[Acceleration, Field(gt=0)], ...),
+    jerk=(Annotated[Jerk, Field(gt=0)] | None, None),
+)
 PointsSlide = _of_a_joint(Points, "Slide", values=(Annotated[Several[Length], TWO_OR_MORE], ...))
 
 _TURNING, _SLIDING = "motion of a joint that turns", "motion of a joint that slides"
-TURNING = kinds(_TURNING, "wanderlast.turning_motions", TimeMotion, SteadyTurn, SwingTurn, SpinUpTurn, PointsTurn)
-SLIDING = kinds(_SLIDING, "wanderlast.sliding_motions", TimeMotion, SteadySlide, SwingSlide, SpinUpSlide, PointsSlide)
+_TURNS = SteadyTurn, SwingTurn, SpinUpTurn, PointsTurn, MoveTurn
+_SLIDES = SteadySlide, SwingSlide, SpinUpSlide, PointsSlide, MoveSlide
+TURNING = kinds(_TURNING, "wanderlast.turning_motions", TimeMotion, *_TURNS)
+SLIDING = kinds(_SLIDING, "wanderlast.sliding_motions", TimeMotion, *_SLIDES)
 COURSES = kinds("course of a load", "wanderlast.courses", TimeMotion, Steady, Swing, Points)
 AnyTurning = Annotated[TimeMotion, KindOf(_TURNING, TURNING)]
 AnySliding = Annotated[TimeMotion, KindOf(_SLIDING, SLIDING)]
 AnyCourse = Annotated[TimeMotion, KindOf("course of a load", COURSES)]
+
+
+def move_pieces(number: Number) -> Array:
+    """(V, pieces, 10) of moves from `start` to `end` within `speed`, `acceleration` and `jerk` (0: no limit)."""
+    start, end, *limits = (number(key) for key in ("start", "end", "speed", "acceleration"))
+    jerk = np.where(number("jerk") > 0.0, number("jerk"), inf)
+    found = blank(start, PHASES)
+    for v, (way, *own) in enumerate(zip(np.abs(end - start), *limits, jerk, strict=True)):
+        if way > 0.0:
+            found[v, :, START : CONSTANT + DEGREE] = profile(way, *own).pieces()
+    found[:, :, CONSTANT : CONSTANT + DEGREE] *= (end - start)[:, None, None]
+    found[:, :, CONSTANT] += start[:, None]
+    return found
 
 
 def spline_pieces(number: Number, count: int, key: str) -> Array:

@@ -5,10 +5,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from engine.floating.march import march
+from engine.floating.model import build
+from engine.scene.motions.point_to_point import PointToPoint
 from engine.scene.study import Study
+from engine.scene.variants import VariantValues
 from results_schema.errors import BadInput
 from studies.protocol.study import kind_of
 from tests.floating.scenes import ARM, history, steps
+from tests.floating.scenes import AVERAGE_ACCELERATION as AVERAGE
 
 GRAVITY, MASS, LENGTH, INERTIA = 9.81, 3.0, 0.8, 0.2
 RIGID = {"kind": "rigid", "length": LENGTH, "mass": MASS, "inertia": INERTIA, "own_weight": True}
@@ -106,3 +111,29 @@ def test_drives_that_are_not_there_are_refused(joints: Any, sensor: Any, words: 
 def test_sensors_of_drives_have_a_joint_and_no_place(sensor: Any) -> None:
     with pytest.raises(BadInput, match="joint"):
         driven([TURNS | {"motion": SWING}], sensor)
+
+
+@pytest.mark.parametrize("jerk", [None, 60.0])
+def test_a_joint_moves_from_point_to_point_as_a_carriage_does(jerk: float | None) -> None:
+    """Angles, and the torque by their accelerations, in variants with limits of their own; it stays at the end."""
+    limits = {"speed": 2.0, "acceleration": 8.0} | ({} if jerk is None else {"jerk": jerk})
+    move = {"kind": "point-to-point", "start": 0.2, "end": 1.1} | limits
+    study = driven([TURNS | {"motion": move}], TORQUE, gravity=0.0)
+    key, speeds = "frame.arm.joints.0.motion.speed", np.array([0.9, 2.0])
+    found = march(build(study), VariantValues(study, {key: speeds}, 2), np.full(2, 1.5), 600, np.arange(601), AVERAGE)
+    inertia = INERTIA + MASS * (0.5 * LENGTH) ** 2
+    for v, speed in enumerate(speeds):
+        own = PointToPoint(**(move | {"speed": speed, "dwell": 1.0}))
+        t = found.times[v]
+        path = own.path(np.minimum(t / own.time_scale, 1.0), "right")
+        smooth = np.abs(np.subtract.outer(t, own.breaks() * own.time_scale)).min(axis=1) > 2.0 * t[1]
+        torque = found.history[v, :, 0]
+        assert torque[smooth] == pytest.approx(inertia * path.ddS[smooth] / own.time_scale**2, abs=1e-9)
+        assert torque[-1] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_joint_whose_ends_are_one_stands_still() -> None:
+    move = {"kind": "point-to-point", "start": 0.2, "end": 0.2, "speed": 1.0, "acceleration": 8.0}
+    model, marched = steps(driven([TURNS | {"motion": move}], TORQUE), 0.5, 50)
+    wanted = MASS * GRAVITY * 0.5 * LENGTH * np.cos(0.2)
+    assert np.abs(history(model, marched, "sensors")[:, 0]) == pytest.approx(wanted, rel=1e-12)
