@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from engine.floating.elastic import ElasticBody
+from engine.floating.attachments import shorter_at
 from engine.floating.lanes import lanes
 from engine.kernels.floating.layout import REVOLUTE
 from engine.kernels.floating.observe import BODY_SPIN, OF_BODY
@@ -26,14 +26,27 @@ RATES = 513  # times at which given motions are looked at beforehand
 DEEP = 0.1  # of the length, as of bodies that stand: a cantilever's deflection is off by 1 % then
 
 
-def lacking(body: ElasticBody) -> float:
+def lacking(model: FloatingModel, name: str) -> float:
     """Stiffness that a body lacks which is not stiffened by its rotation, over its own, per square of the rate (s2):
-    the largest eigenvalue of int x G dm over diag(omega^2), G the foreshortening. 0 where none lacks, or where that is
-    not known, as of frames of beams."""
+    the largest eigenvalue of int x G dm over diag(omega^2), G the foreshortening, with the masses of the bodies that
+    hang on it where they do. 0 where none lacks, or where that is not known, as of frames of beams."""
+    body = model.bodies[name]
     if body.stiffens or not body.slender or not body.omega.size:
         return 0.0
-    _, along = replace(body, stiffens=True).stiffening()
+    stiff = replace(body, stiffens=True)
+    _, along = stiff.stiffening()
+    for other in model.bodies:
+        if model.frame(other).on == name:
+            at = model.frame(other).at
+            x = body.length if at is None else at
+            along = along + _carried(model, other) * x * shorter_at(stiff, np.array([x]))[0]
     return float(np.linalg.eigvalsh(along / np.multiply.outer(body.omega, body.omega))[-1])
+
+
+def _carried(model: FloatingModel, name: str) -> float:
+    """kg of a body and of all that hangs on it."""
+    own = sum(_carried(model, other) for other in model.bodies if model.frame(other).on == name)
+    return model.bodies[name].mass + own
 
 
 def given_rates(model: FloatingModel, values: VariantValues, duration: float) -> dict[str, Array]:
@@ -91,10 +104,10 @@ def unstiffened_times(model: FloatingModel, marched: Marched) -> Array:
     none does."""
     first = model.signal_of("frames") + BODY_SPIN
     found = []
-    for b, body in enumerate(model.bodies.values()):
+    for b, name in enumerate(model.bodies):
         spin = marched.history[:, :, first + OF_BODY * b : first + OF_BODY * b + 3]
         across = spin[..., 1] ** 2 + spin[..., 2] ** 2  # what turns the track's direction
-        found.append(_first(lacking(body) * across > MISSING, marched.times))
+        found.append(_first(lacking(model, name) * across > MISSING, marched.times))
     return np.stack(found, axis=1)
 
 

@@ -80,9 +80,9 @@ def _turned_fast(looked: Looked) -> Iterator[str]:
     worst: dict[str, tuple[float, float]] = {}
     for model, values, seconds in looked.samples:
         rates = given_rates(model, values, float(seconds.max()))
-        for name, body in model.bodies.items():
+        for name in model.bodies:
             rate = float(rates[name].max())
-            worst[name] = max(worst.get(name, (0.0, 0.0)), (lacking(body) * rate**2, rate))
+            worst[name] = max(worst.get(name, (0.0, 0.0)), (lacking(model, name) * rate**2, rate))
     for name, (missing, rate) in worst.items():
         if missing > MISSING:
             yield (
