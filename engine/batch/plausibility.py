@@ -9,7 +9,7 @@ import numpy as np
 from engine.accuracy.grids import SceneGrid
 from engine.batch.coarse_meshes import coarse
 from engine.batch.plan import Plan
-from engine.batch.remarks_of_carriages import stays_level, unreached
+from engine.batch.remarks_of_carriages import ends_early, stays_level, unreached
 from engine.bodies.modal.modal_body import ModalBody
 from engine.model.lane_table import moving_mass, weight
 from engine.observation.signals import build_sensors
@@ -394,4 +394,5 @@ REMARKS = (
     unreached,
     stays_level,
     coarse,
+    ends_early,
 )

@@ -6,6 +6,8 @@ from collections.abc import Iterator
 
 from engine.batch.plan import Plan
 
+IN_A_ROW = 3  # axles: two excite little more than one
+RINGS = 5.0  # first periods after a train, in which two spans pass what they have to each other
 BELOW = 1e-9  # relative: a limit that is missed by more is not reached
 
 
@@ -49,4 +51,16 @@ def stays_level(plan: Plan) -> Iterator[str]:
             yield (
                 f"the body on carriage {name} does not pitch, as contacts of it hold it at one place of its track: "
                 f"{', '.join(level)} stay level, and press as if it were held so; a frame with a point at each pitches"
+            )
+
+
+def ends_early(plan: Plan) -> Iterator[str]:
+    """One sentence for every train that may excite a body in step, whose run hardly goes on after it."""
+    for name, train in plan.study.train.items():
+        motion = train.motion
+        if train.count >= IN_A_ROW and motion.passes and motion.free_vibration < RINGS:
+            yield (
+                f"the run ends {motion.free_vibration:g} first periods after the last axle of train {name} has left, "
+                "and where axles come in step with the body it swings furthest about then: after = "
+                f"{RINGS:g} in its motion sees more of it"
             )

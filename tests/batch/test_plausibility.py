@@ -41,6 +41,12 @@ def cut_coarsely(elements: int) -> Study:
     )
 
 
+def in_a_row(axles: int, after: float) -> Study:
+    """So many axles that cross the bed."""
+    tram = mass(2e-2, WAY | {"after": after}, axles=axles, spacing=0.1)
+    return study(beam(), {}, train={"tram": tram}, gravity=0.1)
+
+
 def on_wheels(**front: Any) -> Study:
     """A bar that lies across, on two wheels at its beginning and one at its end."""
     wheel = {"at": 0.0, "stiffness": 1e3}
@@ -102,6 +108,7 @@ CASES = {
         beam(modes=1), mass(0.1, cruise(0.0, 1.0, 0.5, after=0.25)), output={"residual": True}
     ),
     "the lowest frequencies of straight are up to 34 % off, as twice the elements tell": cut_coarsely(1),
+    "the run ends 1 first periods after the last axle of train tram has left": in_a_row(3, 1.0),
     "does not pitch, as contacts of it hold it at one place of its track: rear and front stay level": on_wheels(),
     "does not act along or across its track: if it did (carriage.car.inertia_along = true": on_portal(),
 }
@@ -117,6 +124,7 @@ def test_an_ordinary_study_is_not_remarked() -> None:
     assert remarks(make_plan(passing(car=mass(0.1, WAY | {"after": 1.0}), output={"residual": True}))) == []
     quick = passing(beam(youngs_modulus=1e8), car=mass(0.1, cruise(0.0, 1.0, 145.0)))
     assert not any("at speeds up to" in remark for remark in remarks(make_plan(quick)))
+    assert remarks(make_plan(in_a_row(2, 1.0))) == remarks(make_plan(in_a_row(3, 5.0))) == []
     both = on_portal(inertia_along=True, inertia_across=True)
     assert all("elements" in remark for remark in remarks(make_plan(both)))  # of which it has few
     assert remarks(make_plan(on_wheels(at=0.2))) == []
