@@ -146,7 +146,8 @@ def converge(
         error[:, active], change[:, active] = told + rung.by_fixed.told(own.columns, own.size), apart
         modes[active], steps[active] = model.modes, level.steps
         found = _replaced(found, active, now)
-        held[active] = worst(told, results, own)
+        left_open = told if study.solver.steps == "auto" else np.broadcast_to(rung.left_out[:, None], told.shape)
+        held[active] = worst(left_open, results, own)
         failed = lost(now.status)
         hopeless = failed & (level.steps >= HOPELESS * coarsest)
         # more steps are of no use where it is the model that misses the tolerance
