@@ -98,8 +98,8 @@ def _position_error(results: Results, sensor: str, beyond: str) -> Iterator[str]
     """How far a tip is from where the rigid arm would have it, in the whole time and after the stop; beyond: what is
     said of a limit."""
     after = _most_and_least(results, f"{sensor}{AFTER_STOP}")
-    where, most = f"{along_way(results, sensor)} {results.place(sensor)}", _most_and_least(results, sensor)
-    what = f"{while_held(results)}the largest position error{where}"
+    where, most = results.place(sensor), _most_and_least(results, sensor)
+    what = f"{while_held(results)}the largest position error {where}"
     yield f"{sensor}: {what}, from where the rigid arm would have it, is {most}.{beyond}"
     if after:
         yield f"After the stop it is still up to {after}."

@@ -69,7 +69,7 @@ def _of_tips(seen: View, tips: list[str], top: Index) -> Figure:
     """How far tips are from where the rigid arm would have them, at all and after the stop; top: where most."""
     results = seen.results
     most = f"{quantity(float(sizes(results, tips[0])[top]), 'm')},{in_words(results, top)}"
-    title = f"The largest position error{along_way(results, tips[0])} {results.place(tips[0])} is {most}"
+    title = f"The largest position error {results.place(tips[0])} is {most}"
     caption = seen.caption(
         "Largest distances from where the rigid arm would have them, in the whole time and from where its joints stop.",
         f"{counted(len(tips) - MOST_TIPS, 'more sensor')} in the archive." if len(tips) > MOST_TIPS else "",

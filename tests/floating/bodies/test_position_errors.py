@@ -225,7 +225,7 @@ def test_the_answer_tells_how_far_the_tip_strays(coarse: xr.Dataset) -> None:
         in said[whole]
     )
     assert after == whole + 1 and f"up to {rest} at mass 0.6 kg; of all variants least, " in said[after]
-    assert any("down: the largest position error along z at 200 mm of tool" in one for one in said)
+    assert any("down: the largest position error at 200 mm of tool along z" in one for one in said)
 
 
 def test_the_answer_of_one_variant_and_without_a_stop() -> None:

@@ -74,6 +74,7 @@ def test_nothing_is_remarked_of_ordinary_studies() -> None:
     slow = {"frame": {"arm": {"joints": [TURN], "turned": [0, "-200 deg", 0], "stiffening": True}}}
     assert KIND.remarks(driven(sensor=read)) == ()
     assert KIND.remarks(driven(**slow)) == ()
+    assert KIND.remarks(driven(sensor={"torque": {"body": "arm", "quantity": "drive_torque"}})) == ()
     assert KIND.remarks(with_tool(frame=HUNG)) == ()
     assert KIND.remarks(driven(sensor={"far": ASIDE | {"direction": "z"}})) == ()
     bends = {"joints": [TURN], "lateral_modes": 1, "lateral_second_moment": 2e-7}
