@@ -234,7 +234,7 @@ def test_the_answer_of_one_variant_and_without_a_stop() -> None:
     found = studies.run(arm({"upper": LINK}, frames, sensor=sensors, question={"duration": 0.2}))
     most = quantity(max(float(found["tip_max"]), -float(found["tip_min"])), "m")
     said = KIND.findings(Results.of(found))
-    assert any("along [0.0, 0.0, 1.0] at 1.5 m of upper" in one for one in said)
+    assert any("at 1.5 m of upper along (0, 0, 1)" in one for one in said)
     assert any(one.startswith("tip: ") and one.endswith(f"would have it, is {most}.") for one in said)
     assert not any("After the stop" in one for one in said)
 
