@@ -4,8 +4,8 @@ from enum import IntEnum
 
 _MESSAGES = (
     "fine",
-    "a contact force is negative before the last 2 % of the way, where the carriage would lift off, or one that slides "
-    "went over an end of its track; values kept",
+    "a contact force is negative before the last 2 % of the way, where the carriage would lift off, or a carriage in a "
+    "frame that moves went over an end of its track; values kept",
     "the error could not be estimated; values kept",
     "the estimated error is larger than the tolerance; values kept",
     "an eigenvalue, tie or Newton solution did not converge; no values",

@@ -12,6 +12,7 @@ import xarray as xr
 import engine
 import studies
 from results_schema.errors import BadInput
+from tests.floating.scenes import sliding_mass
 from tests.studies import scenes
 
 RUNS = (engine.run, studies.run)
@@ -40,6 +41,12 @@ def test_an_archive_is_no_study(run: Any, tmp_path: Path) -> None:
     path.write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(11_000_000))
     said = refused(run, path)
     assert "an archive of results, not a study" in said and "xarray.open_dataset(" in said
+
+
+def test_what_runs_frames_that_move_is_said() -> None:
+    """The engine marches bodies that stand."""
+    said = refused(engine.run, sliding_mass())
+    assert "here they move" in said and "studies.run, which knows this kind" in said
 
 
 @pytest.mark.parametrize("call", [*RUNS, engine.Study])

@@ -30,7 +30,7 @@ def coarse(plan: Plan) -> Iterator[str]:
         if off > MISSED * plan.study.solver.tolerance:
             yield (
                 f"the lowest frequencies of {part.name} are up to {100.0 * off:.2g} % off, as twice the elements tell, "
-                f"and no estimated error has that: its members need more `elements`"
+                "and no estimated error has that: its members need more elements"
             )
 
 

@@ -146,12 +146,11 @@ def converge(
         error[:, active], change[:, active] = told + rung.by_fixed.told(own.columns, own.size), apart
         modes[active], steps[active] = model.modes, level.steps
         found = _replaced(found, active, now)
-        left_open = told if study.solver.steps == "auto" else np.broadcast_to(rung.left_out[:, None], told.shape)
-        held[active] = worst(left_open, results, own)
         failed = lost(now.status)
         hopeless = failed & (level.steps >= HOPELESS * coarsest)
         # more steps are of no use where it is the model that misses the tolerance
         by_model = worst(np.broadcast_to(rung.left_out[:, None], told.shape), results, own)
+        held[active] = worst(told, results, own) if study.solver.steps == "auto" else by_model
         done = worst(by_steps, results, own) <= np.where(by_model > 1.0, by_model, ENOUGH * (1.0 - by_model))
         active = active[(~done | unlike) & ~hopeless]
         if not active.size:

@@ -66,9 +66,7 @@ def given_rates(model: FloatingModel, values: VariantValues, duration: float) ->
 
 def rates_at(pieces: Array, times: Array) -> Array:
     """(V, T) rates of motions in pieces (V, pieces, 10) at times (T,) s."""
-    number = (pieces[:, None, :, START] <= times[:, None]).sum(axis=2) - 1
-    own = np.take_along_axis(pieces, number[:, :, None], axis=1)
-    x = times - own[:, :, START]
+    own, x = _under_way(pieces, times)
     powers = sum(k * own[:, :, CONSTANT + k] * x ** (k - 1) for k in range(1, AMPLITUDE - CONSTANT))
     rate = own[:, :, RATE]
     return np.asarray(powers + own[:, :, AMPLITUDE] * rate * np.cos(rate * x + own[:, :, PHASE]))
@@ -92,11 +90,16 @@ def ends_of_motions(model: FloatingModel, values: VariantValues) -> dict[str, Ar
 
 def places_at(pieces: Array, times: Array) -> Array:
     """(V, T) values of motions in pieces (V, pieces, 10) at times (V, T) s."""
-    number = (pieces[:, None, :, START] <= times[:, :, None]).sum(axis=2) - 1
-    own = np.take_along_axis(pieces, number[:, :, None], axis=1)
-    x = times - own[:, :, START]
+    own, x = _under_way(pieces, times)
     powers = sum(own[:, :, CONSTANT + k] * x**k for k in range(AMPLITUDE - CONSTANT))
     return np.asarray(powers + own[:, :, AMPLITUDE] * np.sin(own[:, :, RATE] * x + own[:, :, PHASE]))
+
+
+def _under_way(pieces: Array, times: Array) -> tuple[Array, Array]:
+    """(V, T, 10) the pieces of motions (V, pieces, 10) that last at times (T,) or (V, T) s, and (V, T) since when."""
+    number = (pieces[:, None, :, START] <= times[..., None]).sum(axis=2) - 1
+    own = np.take_along_axis(pieces, number[:, :, None], axis=1)
+    return own, times - own[:, :, START]
 
 
 def unstiffened_times(model: FloatingModel, marched: Marched) -> Array:

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from engine.scene.study import Study
 
 
-FRAMES = "moving-frames"
+FRAMES = ("moving-frames", "sliding-mass")  # kinds of study in which bodies move
 
 
 def check_stands(study: Study) -> None:
@@ -19,16 +19,16 @@ def check_stands(study: Study) -> None:
     movers = [f"frame.{name}" for name in study.frame]
     movers += [f"{table}.{name}" for table in ("load", "spring") for name in getattr(study, table)]
     movers += [f"carriage.{name}.motion" for name, carriage in study.carriage.items() if carriage.motion.slides]
-    if movers and study.kind == FRAMES:
+    if movers and study.kind in FRAMES:
         what = "this march is that of bodies that stand, and here they move"
         raise study.source.fault(movers[0], what, expected="studies.run, which knows this kind of study")
     if movers:
         what = f"in studies of the kind {study.kind} bodies stand, and carriages go where they are told"
-        raise study.source.fault(movers[0], what, expected=f'kind = "{FRAMES}"')
+        raise study.source.fault(movers[0], what, expected=f'kind = "{FRAMES[0]}"')
     for name, sensor in study.sensor.items():
         if sensor.reads.of_arm or sensor.reads.of_drive:
             what = f"in studies of the kind {study.kind} bodies stand: no joints carry an arm"
-            expected = f'kind = "{FRAMES}", or quantity = "displacement"'
+            expected = f'kind = "{FRAMES[0]}", or quantity = "displacement"'
             raise study.source.fault(f"sensor.{name}.quantity", what, expected=expected, received=sensor.quantity)
 
 

@@ -281,7 +281,7 @@ class Study(Scene):
 
 def _is_of_sweep(name: str, values: Mapping[str, Any]) -> bool:
     """Whether values at dotted keys are also those of an axis."""
-    return any(path == "sweep" or path.startswith(f"sweep.{name}") for path in values)
+    return any(path in ("sweep", f"sweep.{name}") or path.startswith(f"sweep.{name}.") for path in values)
 
 
 def json_schema(kinds: Sequence[str]) -> dict[str, Any]:

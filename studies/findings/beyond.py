@@ -23,8 +23,10 @@ MOST_APART = 3  # of them that are told each with what else is swept
 MOST_TOLD = 3  # values of another swept number that are told one by one
 GAP = 3.0  # times the usual distance of two values of a sweep
 LIMIT = " Its absolute value exceeds "
-LIMITED = ("displacement", "velocity", "acceleration", "bending_moment", "stress")
-LIMITED_OF_ARMS = ("position_error", "drive_torque", "drive_force")
+LIMITED = (
+    *("displacement", "velocity", "acceleration", "bending_moment", "stress"),
+    *("position_error", "drive_torque", "drive_force"),
+)
 
 
 class Limits(Spec):
@@ -38,7 +40,7 @@ class Limits(Spec):
 
     def limit(self, name: str) -> float | None:
         """What is named for a quantity."""
-        return getattr(self, name, None) if name in LIMITED + LIMITED_OF_ARMS else None
+        return getattr(self, name, None) if name in LIMITED else None
 
 
 class AskedOfPassages(Limits):

@@ -108,7 +108,7 @@ CASES = {
         beam(modes=1), mass(0.1, cruise(0.0, 1.0, 0.5, after=0.25)), output={"residual": True}
     ),
     "the lowest frequencies of straight are up to 34 % off, as twice the elements tell": cut_coarsely(1),
-    "the run ends 1 first periods after the last axle of train tram has left": in_a_row(3, 1.0),
+    "the run goes on for 1 first period of the body after the last axle of train tram has left": in_a_row(3, 1.0),
     "does not pitch, as contacts of it hold it at one place of its track: rear and front stay level": on_wheels(),
     "does not act along or across its track: if it did (carriage.car.inertia_along = true": on_portal(),
 }

@@ -95,6 +95,8 @@ def test_a_swept_key_is_not_given_another_value() -> None:
     study = load(MINIMAL).with_values(swept)
     with pytest.raises(BadInput, match=r"carriage\.table\.mass: sweep\.load sets this key in every variant") as error:
         study.with_values({"carriage.table.mass": 5.0})
+    with pytest.raises(BadInput, match="in every variant"):  # whatever another axis is
+        study.with_values({"carriage.table.mass": 5.0, "sweep.loads": {"of": "gravity", "values": [1.0]}})
     assert "without_sweep()" in str(error.value) and "values of sweep.load" in str(error.value)
     assert study.without_sweep().with_values({"carriage.table.mass": 5.0}).value("carriage.table.mass") == 5.0
     again = study.with_values({"carriage.table.mass": 5.0, "sweep.load.values": [3.0]})

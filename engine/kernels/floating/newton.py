@@ -39,7 +39,7 @@ SLOW = 0.1  # a correction over the one before it, from which on the tangent of 
 MOST_ITERATIONS = 25
 STILL = 1e-9  # of a length within a step: what moves by less rests
 #: Of statics, whose coordinates are counted in lengths of their body, rad or m: by how much they are moved for
-#: differences, how far one goes at most by a correction, and the correction at which the iteration ends, as the next
+#: differences, how far they go at most by a correction, and the correction at which the iteration ends, as the next
 #: one is far below rounding.
 MOVED_BY, FARTHEST, CLOSE = 1e-7, 0.1, 1e-9
 MOST_CORRECTIONS = 100
@@ -259,13 +259,14 @@ def stiffness(system, lane, state, solver):
 
 @called
 def come_closer(state, solver):
-    """One correction of the lanes that are under way; the largest part of it."""
-    y, largest, going = state.tried.y, all_lanes(0.0), of(solver.memory, DONE) < 0.5
+    """One correction of the lanes that are under way; its size, infinite where there is none."""
+    y, size, going = state.tried.y, all_lanes(0.0), of(solver.memory, DONE) < 0.5
     solve(solver.fresh, state.residual)
     for k in range(y.shape[0]):
-        part = size_of(lanes_at(state.residual, (k,))) / lanes_at(state.weight, (k,))
-        largest = choose(part > largest, part, largest)
-    share = choose(largest > FARTHEST, FARTHEST / largest, 1.0)
+        part = lanes_at(state.residual, (k,)) / lanes_at(state.weight, (k,))
+        size = size + part * part  # NaN too
+    size = root(size)
+    share = choose(size > FARTHEST, FARTHEST / size, 1.0)
     for k in range(y.shape[0]):
         put_where(going, y, (k,), lanes_at(y, (k,)) - share * lanes_at(state.residual, (k,)))
-    return choose(largest < np.inf, largest, np.inf)
+    return choose(size < np.inf, size, np.inf)
