@@ -13,7 +13,7 @@ from engine.kernels.floating import layout as columns
 from results_schema.arrays import Array, Counts
 
 if TYPE_CHECKING:
-    from engine.floating.elastic import ElasticBody
+    from engine.floating.bodies.elastic import ElasticBody
     from engine.floating.model import FloatingModel
     from engine.scene.loads import SpringEnd
     from engine.scene.study import Study
@@ -33,7 +33,7 @@ class Grip:
 
 
 class GripTables(NamedTuple):
-    """gripped (P): bodies; grips (P, GRIP), modes (P n, GRIP_MODE), shorter (P, n, n)."""
+    """gripped (P): bodies; grips (P, GRIP), modes (P n, GRIP_MODE), shorter (P, A, n, n)."""
 
     gripped: Counts
     grips: Array
@@ -105,10 +105,10 @@ def springs_of(study: Study, bodies: dict[str, ElasticBody]) -> Iterator[tuple[G
     return ((grip(spring.ends[0]), grip(spring.ends[1])) for spring in study.spring.values())
 
 
-def grip_tables(bodies: Sequence[ElasticBody], grips: Sequence[Grip], n: int) -> GripTables:
-    """The tables of `engine.kernels.floating.layout.System` of some grips."""
+def grip_tables(bodies: Sequence[ElasticBody], grips: Sequence[Grip], n: int, axes: int) -> GripTables:
+    """The tables of `engine.kernels.floating.layout.System` of some grips; axes: along which places come nearer."""
     table, modes = np.zeros((len(grips), columns.GRIPS)), np.zeros((len(grips), n, columns.GRIP_MODE))
-    pairs = np.zeros((len(grips), n, n))
+    pairs = np.zeros((len(grips), axes, n, n))
     for p, grip in enumerate(grips):
         table[p, columns.WEIGHT] = grip.weights.sum()
         table[p, columns.ARM : columns.ARM + 3] = grip.position
@@ -121,7 +121,7 @@ def grip_tables(bodies: Sequence[ElasticBody], grips: Sequence[Grip], n: int) ->
             modes[p, :N, columns.PUSHED : columns.PUSHED + 3] = fields[:, :3]
             # rotations belong to one place, whatever its weight
             modes[p, :N, columns.TWISTED : columns.TWISTED + 3] = fields[:, 3:] / grip.weights.sum()
-            pairs[p, :N, :N] = np.einsum("s,sij->ij", grip.weights, shorter_at(body, grip.x))
+            pairs[p, : body.shortened, :N, :N] = np.einsum("s,saij->aij", grip.weights, shorter_at(body, grip.x))
     gripped = np.array([grip.body for grip in grips], dtype=np.int64)
     return GripTables(gripped, table, modes.reshape(-1, columns.GRIP_MODE), pairs)
 
@@ -146,9 +146,8 @@ def tip_tables(model: FloatingModel, n: int) -> TipTables:
 
 
 def shorter_at(body: ElasticBody, x: Array) -> Array:
-    """(S, N, N): G(x) = int_0^x (v_i' v_j' + w_i' w_j') at places; zero where it is not asked for."""
+    """(S, A, N, N): G at ascending places along as many axes as marches have it."""
     N = body.omega.size
-    if not body.stiffens:
-        return np.zeros((x.size, N, N))
-    parts = (_gauss(0.0, place, FORCES) for place in x)
-    return np.stack([np.einsum("g,gij->ij", weights, body.bent(nodes)[0]) for nodes, weights in parts])
+    if body.shortening is None or not body.stiffens:
+        return np.zeros((x.size, 0, N, N))
+    return np.asarray(body.shortening.along(x)[0])

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from engine.floating.attachments import Grip, LoadAt, grip_tables, loads_of, shorter_at, springs_of, tip_tables
-from engine.floating.bodies import elastic_body
-from engine.floating.elastic import CELLS, ElasticBody, Y, Z
+from engine.floating.bodies.build import elastic_body
+from engine.floating.bodies.elastic import CELLS, ElasticBody
+from engine.floating.bodies.fields import Y, Z
 from engine.floating.refusals import refuse_model, refuse_scene
 from engine.kernels.floating import layout as columns
 from engine.kernels.floating.layout import System
@@ -225,20 +226,21 @@ def _system(model: FloatingModel) -> System:
     tree = np.zeros((B, columns.TREE), dtype=np.int64)
     numbers = np.zeros((B, columns.BODY))
     modes, pairs = np.zeros((B, n, columns.MODE)), np.zeros((B, n, n, columns.PAIR))
-    track, shorter = np.zeros((B, CELLS, 6, 6, n)), np.zeros((B, CELLS, 6, n, n))
-    hanging_shorter = np.zeros((B, n, n))
+    most = max(1, *(body.shortened for body in model.bodies.values()))
+    track, shorter = np.zeros((B, CELLS, 6, 6, n)), np.zeros((B, CELLS, 6, most, n, n))
+    hanging_shorter = np.zeros((B, most, n, n))
     joint = 0
     for b, (name, body) in enumerate(model.bodies.items()):
         own = sum(one.body == name for one in model.joints)
         N = body.omega.size
         parent = -1 if model.frame(name).on == GROUND else names.index(model.frame(name).on)
-        tree[b] = parent, model.first[name], N, joint, joint + own, int(parent < 0 and own == 0)
+        tree[b] = parent, model.first[name], N, joint, joint + own, int(parent < 0 and own == 0), body.shortened
         joint += own
         _fill_integrals(body, numbers[b], modes[b, :N], pairs[b, :N, :N])
         _hang(model, name, numbers[b], modes[b], hanging_shorter[b])
         if N:
             track[b, ..., :N] = body.track()
-            shorter[b, :, :, :N, :N] = body.foreshortening().reshape(CELLS, 6, N, N)
+            shorter[b, :, :, : body.shortened, :N, :N] = body.foreshortening()
     loads, tips = list(enumerate(model.loads)), tip_tables(model, n)
     grips = [*(load.grip for load in model.loads), *(grip for link in model.links for grip in link)]
     return System(
@@ -250,10 +252,10 @@ def _system(model: FloatingModel) -> System:
         np.array([j.axis for j in model.joints], dtype=np.float64).reshape(-1, 3),
         track,
         np.any(track != 0.0, axis=(1, 2)),
-        shorter.reshape(B, CELLS, 6, n * n),
+        shorter.reshape(B, CELLS, 6, most, n * n),
         hanging_shorter,
         _riders(model, names),
-        *grip_tables(list(model.bodies.values()), grips, n),
+        *grip_tables(list(model.bodies.values()), grips, n, most),
         np.array(
             [(q, int(load.in_body), model.motions.index(load.course) if load.course else -1) for q, load in loads],
             dtype=np.int64,
@@ -283,7 +285,7 @@ def _fill_integrals(body: ElasticBody, numbers: Array, modes: Array, pairs: Arra
     # J = tr P - P is to be larger by the body's own inertia
     second += 0.5 * body.own_inertia.sum() * np.eye(3) - np.diag(body.own_inertia)
     numbers[columns.SECOND : columns.SECOND + 9] = second.reshape(9)
-    numbers[columns.LENGTH], numbers[columns.STIFFENS] = body.length, float(body.stiffens)
+    numbers[columns.LENGTH] = body.length
     modes[:, columns.TRANSLATION : columns.TRANSLATION + 3] = np.einsum("g,gan->na", dm, phi)
     first = np.einsum("g,ga,gbn->nab", dm, c, phi)
     modes[:, columns.FIRST_ORDER : columns.FIRST_ORDER + 9] = first.reshape(-1, 9)
@@ -291,8 +293,12 @@ def _fill_integrals(body: ElasticBody, numbers: Array, modes: Array, pairs: Arra
     pairs[:, :, columns.SECOND_ORDER : columns.SECOND_ORDER + 9] = both.reshape(*both.shape[:2], 9)
     pairs[:, :, columns.MODAL_MASS] = np.einsum("ijaa->ij", both)
     pairs[:, :, columns.STIFFNESS] = np.diag(body.omega**2)
-    whole, along = body.stiffening()
-    pairs[:, :, columns.STIFFENING], pairs[:, :, columns.STIFFENING + 1] = whole, along
+    if body.shortening is not None and body.shortened:
+        whole, moments = body.shortening.integrals()
+        A = body.shortened
+        pairs[:, :, columns.NEARING : columns.NEARING + A] = np.moveaxis(whole, 0, -1)
+        turned = moments.reshape(3 * A, *moments.shape[2:])
+        pairs[:, :, columns.NEARING_MOMENT : columns.NEARING_MOMENT + 3 * A] = np.moveaxis(turned, 0, -1)
 
 
 def _hang(model: FloatingModel, name: str, numbers: Array, modes: Array, shorter: Array) -> None:
@@ -312,7 +318,7 @@ def _hang(model: FloatingModel, name: str, numbers: Array, modes: Array, shorter
         N = parent.omega.size
         modes[:N, columns.HANGING_SHAPE : columns.HANGING_SHAPE + 3] = fields[:3].T
         modes[:N, columns.HANGING_TURN : columns.HANGING_TURN + 3] = fields[3:].T
-        shorter[:N, :N] = shorter_at(parent, np.array([at]))[0]
+        shorter[: parent.shortened, :N, :N] = shorter_at(parent, np.array([at]))[0]
 
 
 def _riders(model: FloatingModel, names: list[str]) -> Counts:

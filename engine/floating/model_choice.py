@@ -143,8 +143,9 @@ def _with_more_modes(study: Study, times: int) -> Study:
     bodies = {name: body if body.modes_are_open else body.with_more_modes(times) for name, body in study.body.items()}
     frames = {}
     for name, frame in study.frame.items():
-        lateral, axial = (min(times * count, MAX_MODES) for count in (frame.lateral_modes, frame.axial_modes))
-        frames[name] = frame.model_copy(update={"lateral_modes": lateral, "axial_modes": axial})
+        counts = {key: getattr(frame, key) for key in ("lateral_modes", "axial_modes", "torsion_modes")}
+        more = {key: min(times * count, MAX_MODES) for key, count in counts.items()}
+        frames[name] = frame.model_copy(update=more)
     return study.model_copy(update={"body": bodies, "frame": frames})
 
 

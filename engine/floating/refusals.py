@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from engine.floating.elastic import ABOUT_X, Z
+from engine.floating.bodies.fields import ABOUT_X, Z
 from engine.scene.frames import GROUND, Frame, Free
 
 if TYPE_CHECKING:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from engine.floating.attachments import shorter_at
 from engine.floating.lanes import lanes
 from engine.kernels.floating.layout import REVOLUTE
 from engine.kernels.floating.observe import BODY_SPIN, OF_BODY
@@ -26,21 +24,26 @@ RATES = 513  # times at which given motions are looked at beforehand
 DEEP = 0.1  # of the length, as of bodies that stand: a cantilever's deflection is off by 1 % then
 
 
-def lacking(model: FloatingModel, name: str) -> float:
-    """Stiffness that a body lacks which is not stiffened by its rotation, over its own, per square of the rate (s2):
-    the largest eigenvalue of int x G dm over diag(omega^2), G the foreshortening, with the masses of the bodies that
-    hang on it where they do. 0 where none lacks, or where that is not known, as of frames of beams."""
+def lacking(model: FloatingModel, name: str) -> Array:
+    """(3,) stiffness that a body lacks which is not stiffened by its rotation, over its own, per square of the rate
+    about each axis of its frame (s2): the eigenvalue furthest from 0 of what rotation stiffens it by over
+    diag(omega^2), with the masses of the bodies that hang on it. 0 where none lacks, or where that is not known, as of
+    bodies out of finite-element files."""
     body = model.bodies[name]
-    if body.stiffens or not body.slender or not body.omega.size:
-        return 0.0
-    stiff = replace(body, stiffens=True)
-    _, along = stiff.stiffening()
+    if body.stiffens or body.shortening is None or not body.omega.size:
+        return np.zeros(3)
+    moments = body.shortening.integrals()[1].copy()
     for other in model.bodies:
         if model.frame(other).on == name:
             at = model.frame(other).at
             x = body.length if at is None else at
-            along = along + _carried(model, other) * x * shorter_at(stiff, np.array([x]))[0]
-    return float(np.linalg.eigvalsh(along / np.multiply.outer(body.omega, body.omega))[-1])
+            moments[:, 0] += _carried(model, other) * x * body.shortening.along(np.array([x]))[0, 0]
+    found = []
+    for axis in np.eye(3):
+        across = (np.eye(3) - np.outer(axis, axis))[: len(moments)]  # places are drawn away from the axis
+        ratio = np.einsum("ab,abij->ij", across, moments) / np.multiply.outer(body.omega, body.omega)
+        found.append(np.abs(np.linalg.eigvalsh(ratio)).max())
+    return np.array(found)
 
 
 def _carried(model: FloatingModel, name: str) -> float:
@@ -109,8 +112,7 @@ def unstiffened_times(model: FloatingModel, marched: Marched) -> Array:
     found = []
     for b, name in enumerate(model.bodies):
         spin = marched.history[:, :, first + OF_BODY * b : first + OF_BODY * b + 3]
-        across = spin[..., 1] ** 2 + spin[..., 2] ** 2  # what turns the track's direction
-        found.append(_first(lacking(model, name) * across > MISSING, marched.times))
+        found.append(_first(spin**2 @ lacking(model, name) > MISSING, marched.times))
     return np.stack(found, axis=1)
 
 

@@ -18,6 +18,7 @@ from engine.study_file.units import (
     Damping,
     Inertia,
     Length,
+    Pressure,
     RotationalDamping,
     RotationalStiffness,
     SecondMoment,
@@ -183,8 +184,9 @@ class Frame(Spec):
     over the ground, of a body that hangs there. turned: rotation vector (rad) of the frame before its joints. joints:
     from what it hangs on outward; none: it is fixed. inertia: of a rigid body about its centre of mass (kg m2), about
     its pitch inertia in all directions if not given. lateral_second_moment, lateral_modes: bending across the track;
-    its supports are those of bending. axial_modes: stretching, held where the track begins. stiffening: the track grows
-    shorter as it bends, so that what pulls at it stiffens it (first order).
+    its supports are those of bending. axial_modes: stretching; torsion_modes, with shear_modulus and torsion_constant:
+    twisting; both held where the track begins, unless both its ends are free. stiffening: places come nearer as the
+    body bends, so that what pulls at them stiffens it (first order).
     """
 
     on: Annotated[str, Noun('"ground" or the name of a body')] = GROUND
@@ -196,6 +198,9 @@ class Frame(Spec):
     lateral_second_moment: SecondMoment | None = Field(default=None, gt=0)
     lateral_modes: int = Field(default=0, ge=0, le=32)
     axial_modes: int = Field(default=0, ge=0, le=32)
+    torsion_constant: SecondMoment | None = Field(default=None, gt=0)
+    shear_modulus: Pressure | None = Field(default=None, gt=0)
+    torsion_modes: int = Field(default=0, ge=0, le=32)
     stiffening: bool = False
 
     @property
@@ -215,6 +220,11 @@ class Frame(Spec):
             raise fault("a body that hangs on another one is there where `at` says", expected="at = metres")
         if self.lateral_modes and self.lateral_second_moment is None:
             raise fault("bending across the track needs its second moment", expected="lateral_second_moment")
+        if self.torsion_modes and None in (self.torsion_constant, self.shear_modulus):
+            raise fault("twisting needs a stiffness", expected="torsion_constant and shear_modulus")
+        if self.torsion_modes and self.stiffening:
+            what = "a beam with torsion modes that stiffens is not built"
+            raise fault(what, expected="one of both", remedy="a body of the kind frame with one member has both")
         return self
 
     def checks(self, name: str) -> Iterator[Check]:

@@ -82,7 +82,7 @@ def _turned_fast(looked: Looked) -> Iterator[str]:
         rates = given_rates(model, values, float(seconds.max()))
         for name in model.bodies:
             rate = float(rates[name].max())
-            worst[name] = max(worst.get(name, (0.0, 0.0)), (lacking(model, name) * rate**2, rate))
+            worst[name] = max(worst.get(name, (0.0, 0.0)), (float(lacking(model, name).max()) * rate**2, rate))
     for name, (missing, rate) in worst.items():
         if missing > MISSING:
             yield (
@@ -193,7 +193,7 @@ def _nothing_across(looked: Looked) -> Iterator[str]:
 
 def _stays_in_plane(model: FloatingModel, name: str) -> bool:
     """Whether a body keeps the y axis of what it hangs on, and does not bend along it, nor twist."""
-    from engine.floating.elastic import ABOUT_X, ABOUT_Z
+    from engine.floating.bodies.fields import ABOUT_X, ABOUT_Z
     from engine.kernels.floating.layout import PRISMATIC, REVOLUTE
 
     body, turned = model.bodies[name], np.array(model.frame(name).turned)

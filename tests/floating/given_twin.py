@@ -43,7 +43,7 @@ TERMS = {
         "keep_matrix(work.turning, b, RATES, ((zero, zero, zero),) * 3)",
     ),
     "Euler terms": ("vector(work.frames, b, ANGULAR)", "(all_lanes(0.0),) * 3"),
-    "centrifugal terms": ("zero, square = all_lanes(0.0), dot(w, w)", "zero, square = all_lanes(0.0), all_lanes(0.0)"),
+    "centrifugal terms": ("turned_by(w, al)", "turned_by(times(0.0, w), al)"),
     "rates in the step": ("part = of_u * lanes_at(work.turning, (b, RATES + e)) + ", "part = "),
     "values in the step": (" + of_y * lanes_at(work.turning, (b, VALUES + e))", ""),
     "what modes do by rates": ("by_rate = by_rate + both * lanes_at(work.turning, (b, RATES + 3 * a + e))", "pass"),
@@ -69,11 +69,11 @@ TERMS = {
 }  # fmt: skip
 #: The same where they are linearised.
 LINEARISED = {
-    "stiffening across": ("system.pairs[row, STIFFENING + 1] * across", "0.0"),
-    "stiffening along": (" - system.pairs[row, STIFFENING] * base", ""),
+    "stiffening by turning": (" - turned_nearer(system, b, row, turning)", ""),
+    "stiffening by accelerations": (" - pulled(system, b, row, base)", ""),
     "stiffening by carriages": ("by * lanes_at(state.tried.y, (first + j,)))", "0.0 * by)"),
     "stiffening by carriages in the step": ("ways[0] * by)\n\n", "0.0 * by)\n\n"),
-    "stiffening by loads": ("by = by + system.grip_shorter[p, i, j] * f[0]", "pass"),
+    "stiffening by loads": ("by = by + weighed(system.grip_shorter, p, system.tree[b, SHORTENED], (i, j), f)", "pass"),
     "torques of loads": ("weight * dot(turned, about)", "0.0"),
     "turned torques": ("(-0.5 * weight) * dot(cross(other, turned), about)", "0.0 * about[0]"),
     "loads in the step": ("add_to_matrix(solver.fresh, first + i, first + j, ways[0] * by)\n        add_to", "add_to"),

@@ -212,7 +212,7 @@ TERMS = {
     "tr(H) w . w": (" - (H[0][0] + H[1][1] + H[2][2]) * square", ""),
     "2 w . sum ax(H_ji) q_j'": ("2.0 * dot(w, axial(B)) * lanes_at(x.u, (first + j,))", "0.0"),
     "M q''": (" + (B[0][0] + B[1][1] + B[2][2]) * lanes_at(x.a, (first + j,))", ""),
-    "K q": ("(system.pairs[pair, STIFFNESS] + stiffening) * lanes_at(x.y, (first + j,))", "0.0"),
+    "K q": ("r = r + stiffness * lanes_at(x.y, (first + j,))", "pass"),
     "D q'": ("lanes_at(lane.damping, (row,)) * lanes_at(x.u, (first + i,)) - (H", "-(H"),
     # of what moves on it, (11)-(20)
     "al x d": ("add(acc, add(cross(al, d), ", "add(acc, add(no_vector(), "),

@@ -11,7 +11,7 @@ from tests.readme import README
 TERMS = {
     "residual_twin": residual_twin.TERMS,
     "loads_twin": loads_twin.TERMS,
-    "stiffening_twin": stiffening_twin.TERMS,
+    "stiffening_twin": stiffening_twin.TERMS | stiffening_twin.TURNING,
     "tangent_twin": tangent_twin.TERMS,
     "given_twin": given_twin.TERMS | given_twin.LINEARISED,
 }

@@ -7,9 +7,11 @@ from engine.kernels.floating.layout import (
     MODAL_MASS,
     MODES,
     MOMENT,
+    NEARING,
+    NEARING_MOMENT,
     SECOND,
     SECOND_ORDER,
-    STIFFENING,
+    SHORTENED,
     STIFFNESS,
     TRANSLATION,
 )
@@ -32,7 +34,7 @@ from engine.kernels.floating.vectors import (
 )
 from engine.kernels.floating.work import ACCELERATION, ANGULAR, FORCE, SPIN, TORQUE, add_to
 from engine.kernels.jit import called
-from engine.kernels.vector import lanes_at
+from engine.kernels.vector import all_lanes, lanes_at
 
 
 @called
@@ -73,8 +75,7 @@ def mode_force(system, lane, b, i, x, work, out):
     n, first, widest = system.tree[b, MODES], system.tree[b, FIRST], system.track.shape[4]
     w, al, acc = vector(work.frames, b, SPIN), vector(work.frames, b, ANGULAR), vector(work.frames, b, ACCELERATION)
     row, H = b * widest + i, matrix(work.moments, i, 0)
-    square = dot(w, w)
-    across = square - w[0] * w[0]  # what turns the track's direction
+    square, turning = dot(w, w), turned_by(w, al)
     r = dot(shared_vector(system.modes, row, TRANSLATION), acc) + dot(axial(H), al) + dot(w, turned_out(H, w))
     r = r + lanes_at(lane.damping, (row,)) * lanes_at(x.u, (first + i,)) - (H[0][0] + H[1][1] + H[2][2]) * square
     for j in range(n):
@@ -82,9 +83,42 @@ def mode_force(system, lane, b, i, x, work, out):
         r = r + 2.0 * dot(w, axial(B)) * lanes_at(x.u, (first + j,))
         r = r + (B[0][0] + B[1][1] + B[2][2]) * lanes_at(x.a, (first + j,))
         pair = row * widest + j
-        stiffening = system.pairs[pair, STIFFENING + 1] * across - system.pairs[pair, STIFFENING] * acc[0]
-        r = r + (system.pairs[pair, STIFFNESS] + stiffening) * lanes_at(x.y, (first + j,))
+        stiffness = all_lanes(system.pairs[pair, STIFFNESS])
+        if system.tree[b, SHORTENED]:
+            stiffness = stiffness - pulled(system, b, pair, acc) - turned_nearer(system, b, pair, turning)
+        r = r + stiffness * lanes_at(x.y, (first + j,))
     add_to(out, first + i, r)
+
+
+@called
+def turned_by(w, al):
+    """[al]x + [w]x [w]x, as rows: the acceleration of places of a frame by its rotation is that times the places."""
+    square = dot(w, w)
+    return (
+        (w[0] * w[0] - square, w[0] * w[1] - al[2], w[0] * w[2] + al[1]),
+        (w[1] * w[0] + al[2], w[1] * w[1] - square, w[1] * w[2] - al[0]),
+        (w[2] * w[0] - al[1], w[2] * w[1] + al[0], w[2] * w[2] - square),
+    )
+
+
+@called
+def pulled(system, b, pair, acc):
+    """int G dm of a pair of modes times the acceleration of their body."""
+    found = system.pairs[pair, NEARING] * acc[0]
+    if system.tree[b, SHORTENED] > 1:
+        found = found + system.pairs[pair, NEARING + 1] * acc[1] + system.pairs[pair, NEARING + 2] * acc[2]
+    return found
+
+
+@called
+def turned_nearer(system, b, pair, turning):
+    """int G_a c_b dm times what accelerates places by rotation, as of `turned_by`."""
+    found = system.pairs[pair, NEARING_MOMENT] * turning[0][0]
+    if system.tree[b, SHORTENED] > 1:
+        moment = shared_matrix(system.pairs, pair, NEARING_MOMENT)
+        found = found + moment[0][1] * turning[0][1] + moment[0][2] * turning[0][2]
+        found = found + dot(moment[1], turning[1]) + dot(moment[2], turning[2])
+    return found
 
 
 @called
@@ -99,7 +133,9 @@ def modal_forces(system, lane, b, x, work, out):
         for j in range(n):
             pair = row * widest + j
             r = r + system.pairs[pair, MODAL_MASS] * lanes_at(x.a, (first + j,))
-            stiffness = system.pairs[pair, STIFFNESS] - system.pairs[pair, STIFFENING] * acc[0]
+            stiffness = all_lanes(system.pairs[pair, STIFFNESS])
+            if system.tree[b, SHORTENED]:
+                stiffness = stiffness - pulled(system, b, pair, acc)
             r = r + stiffness * lanes_at(x.y, (first + j,))
         add_to(out, first + i, r)
     keep_vector(work.frames, b, FORCE, no_vector())

@@ -15,11 +15,11 @@ from engine.kernels.floating.layout import (
     PLACE_MOTION,
     RESTS,
     RIDDEN,
+    SHORTENED,
     SLIP,
     SPRING,
     SPRUNG_COORDINATE,
     SPRUNG_MASS,
-    STIFFENS,
     VISCOUS,
 )
 from engine.kernels.floating.tracks import (
@@ -30,7 +30,7 @@ from engine.kernels.floating.tracks import (
     TURN_CURVE,
     TURN_SLOPE,
     combined_there,
-    foreshortening_at,
+    pulled_nearer,
     shapes_at,
 )
 from engine.kernels.floating.vectors import (
@@ -142,27 +142,27 @@ def push_frame(work, b, d, f):
 
 @called
 def pull_along(system, lane, c, along, work):
-    """The force that a carriage needs along an undeformed track, which stiffens the bent one: products of deflections
-    are left out with what the shortening adds to its acceleration, which would balance them."""
+    """The force that a carriage needs on an undeformed body, which stiffens the bent one: products of deflections are
+    left out with what the shortening adds to its acceleration, which would balance them."""
     b, (s, ds, dds) = system.riders[c, RIDDEN], along
     origin, zero, height = shared_vector(system.bodies, b, ORIGIN), all_lanes(0.0), carried(lane, c, HEIGHT)
     own, sprung = carried(lane, c, OWN_MASS), carried(lane, c, SPRUNG_MASS)
     d, rate, change = (s + origin[0], zero + origin[1], zero + origin[2]), (ds, zero, zero), (dds, zero, zero)
     below = acceleration_at(system, work, b, (d[0], d[1], d[2] + height), rate, change)
-    return own * below[0] + sprung * acceleration_at(system, work, b, d, rate, change)[0]
+    return add(times(own, below), times(sprung, acceleration_at(system, work, b, d, rate, change)))
 
 
 @called
 def push_modes(system, b, x, work, forces, out):
-    """A force of a carriage on the modes at its place; where the track between its origin and there grows shorter as it
-    bends, the one along it through that too."""
+    """A force of a carriage on the modes at its place; where that comes nearer as the body bends, what pulls at the
+    undeformed one through that too."""
     n, first, widest = system.tree[b, MODES], system.tree[b, FIRST], system.track.shape[4]
     f, pull = forces
     for i in range(n):
         r = dot(vector(work.modes, i, SHAPE), f)
-        if system.bodies[b, STIFFENS] > 0.0:
+        if system.tree[b, SHORTENED]:
             for j in range(n):
-                r = r - foreshortening_at(system, b, i * widest + j, work) * lanes_at(x.y, (first + j,)) * pull
+                r = r - pulled_nearer(system, b, i * widest + j, pull, work) * lanes_at(x.y, (first + j,))
         add_to(out, first + i, r)
 
 

@@ -21,12 +21,12 @@ from engine.kernels.floating.layout import (
     PARENT,
     PRISMATIC,
     RESTS,
+    SHORTENED,
     SPHERICAL,
-    STIFFENS,
     TURNED,
 )
 from engine.kernels.floating.loads import link_forces, load_forces
-from engine.kernels.floating.tracks import shorter_by
+from engine.kernels.floating.tracks import shorter_by, span_of
 from engine.kernels.floating.vectors import (
     add,
     add_vector,
@@ -106,8 +106,8 @@ def gather(system, lane, b, x, work, out):
         for i in range(n):
             turning = spin_of(t, shared_vector(system.modes, row + i, HANGING_TURN))
             add_to(out, first + i, dot(shared_vector(system.modes, row + i, HANGING_SHAPE), F) + dot(turning, T))
-            if system.bodies[p, STIFFENS] > 0.0:  # the track up to there grows shorter as it bends
-                add_to(out, first + i, -1.0 * shorter_by(system.hanging_shorter, b, i, n, x.y, first) * F[0])
+            if system.tree[p, SHORTENED]:
+                add_to(out, first + i, -1.0 * shorter_by(system.hanging_shorter, b, span_of(system, p), i, x.y, F))
     add_vector(work.frames, p, FORCE, F)
     add_vector(work.frames, p, TORQUE, add(T, cross(vector(work.frames, b, HANGING_PLACE), F)))
 

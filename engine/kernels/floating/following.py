@@ -14,11 +14,11 @@ from engine.kernels.floating.layout import (
     PARENT,
     PLACE,
     PRISMATIC,
+    SHORTENED,
     SPHERICAL,
-    STIFFENS,
     TURNED,
 )
-from engine.kernels.floating.tracks import combined, nearer
+from engine.kernels.floating.tracks import combined, nearer, span_of
 from engine.kernels.floating.vectors import (
     add,
     add_vector,
@@ -72,8 +72,8 @@ def follow_frame(system, lane, b, x, work):
         place = add(place, combined(system.modes, row, HANGING_SHAPE, n, x.y, first))
         rate = combined(system.modes, row, HANGING_SHAPE, n, x.u, first)
         change = combined(system.modes, row, HANGING_SHAPE, n, x.a, first)
-        if system.bodies[p, STIFFENS] > 0.0:
-            place, rate, change = drawn_in(system, b, n, x, first, (place, rate, change))
+        if system.tree[p, SHORTENED]:
+            place, rate, change = drawn_in(system, b, x, (place, rate, change))
         shift(frames, b, place, rate, change)
         keep_vector(frames, b, HANGING_PLACE, place)
         if n:
@@ -90,13 +90,13 @@ def follow_frame(system, lane, b, x, work):
 
 
 @called
-def drawn_in(system, b, n, x, first, moving):
-    """Place, velocity and acceleration where a body hangs on a track that grows shorter as it bends, -1/2 q G q."""
-    G, (d, rate, change) = system.hanging_shorter, moving
-    nearing = nearer(G, b, n, x.y, x.u, first)
-    coming = nearer(G, b, n, x.y, x.a, first) + nearer(G, b, n, x.u, x.u, first)
-    d = (d[0] - 0.5 * nearer(G, b, n, x.y, x.y, first), d[1], d[2])
-    return d, (rate[0] - nearing, rate[1], rate[2]), (change[0] - coming, change[1], change[2])
+def drawn_in(system, b, x, moving):
+    """Place, velocity and acceleration where a body hangs on one whose places come nearer as it bends, -1/2 q G q."""
+    G, p, (d, rate, change) = system.hanging_shorter, system.tree[b, PARENT], moving
+    span = span_of(system, p)
+    coming = add(nearer(G, b, span, x.y, x.a), nearer(G, b, span, x.u, x.u))
+    d = add(d, times(-0.5, nearer(G, b, span, x.y, x.y)))
+    return d, add(rate, times(-1.0, nearer(G, b, span, x.y, x.u))), add(change, times(-1.0, coming))
 
 
 @called

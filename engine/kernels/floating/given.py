@@ -10,6 +10,7 @@ T = 1 + of_u U + of_y Y stands for 1 in the mass matrix. What a carriage stiffen
 linear in them, and directions of torques follow them in first order.
 """
 
+from engine.kernels.floating.bodies import pulled, turned_by, turned_nearer
 from engine.kernels.floating.carriages import acceleration_at, carried, pull_along, ridden, touched
 from engine.kernels.floating.following import follow_frame
 from engine.kernels.floating.layout import (
@@ -23,11 +24,10 @@ from engine.kernels.floating.layout import (
     RESTS,
     RIDDEN,
     SECOND_ORDER,
+    SHORTENED,
     SPRING,
     SPRUNG_COORDINATE,
     SPRUNG_MASS,
-    STIFFENING,
-    STIFFENS,
     STIFFNESS,
     TRANSLATION,
     TWISTED,
@@ -35,7 +35,7 @@ from engine.kernels.floating.layout import (
 )
 from engine.kernels.floating.loads import load_at
 from engine.kernels.floating.state import advance, factor, solve
-from engine.kernels.floating.tracks import CURVE, SHAPE, SLOPE, foreshortening_at, shapes_at
+from engine.kernels.floating.tracks import CURVE, SHAPE, SLOPE, pulled_nearer, shapes_at, weighed
 from engine.kernels.floating.vectors import (
     add,
     add_vector,
@@ -43,6 +43,7 @@ from engine.kernels.floating.vectors import (
     dot,
     keep_matrix,
     keep_vector,
+    matrix,
     shared_vector,
     times,
     vector,
@@ -102,19 +103,14 @@ def turning(b, ways, work):
     """U, Y and T of a body's frame into work.turning."""
     of_y, of_u = ways
     w, al = vector(work.frames, b, SPIN), vector(work.frames, b, ANGULAR)
-    zero, square = all_lanes(0.0), dot(w, w)
+    zero = all_lanes(0.0)
     by_rate = (
         (zero, -2.0 * w[2], 2.0 * w[1]),
         (2.0 * w[2], zero, -2.0 * w[0]),
         (-2.0 * w[1], 2.0 * w[0], zero),
     )
-    by_value = (
-        (w[0] * w[0] - square, w[0] * w[1] - al[2], w[0] * w[2] + al[1]),
-        (w[1] * w[0] + al[2], w[1] * w[1] - square, w[1] * w[2] - al[0]),
-        (w[2] * w[0] - al[1], w[2] * w[1] + al[0], w[2] * w[2] - square),
-    )
     keep_matrix(work.turning, b, RATES, by_rate)
-    keep_matrix(work.turning, b, VALUES, by_value)
+    keep_matrix(work.turning, b, VALUES, turned_by(w, al))
     for e in range(9):
         part = of_u * lanes_at(work.turning, (b, RATES + e)) + of_y * lanes_at(work.turning, (b, VALUES + e))
         put_lanes(work.turning, (b, WHOLE + e), part + (1.0 if e % 4 == 0 else 0.0))
@@ -145,10 +141,9 @@ def pair(system, number, ways, state, solver):
     widest, first, work = system.track.shape[4], system.tree[b, FIRST], solver.work
     row, k, m = (b * widest + i) * widest + j, first + i, first + j
     by_rate, by_value = all_lanes(0.0), all_lanes(system.pairs[row, STIFFNESS])
-    if system.bodies[b, STIFFENS] > 0.0:
-        w, base = vector(work.frames, b, SPIN), lanes_at(work.frames, (b, ACCELERATION))
-        across = w[1] * w[1] + w[2] * w[2]
-        by_value = by_value + system.pairs[row, STIFFENING + 1] * across - system.pairs[row, STIFFENING] * base
+    if system.tree[b, SHORTENED]:
+        turning, base = matrix(work.turning, b, VALUES), vector(work.frames, b, ACCELERATION)
+        by_value = by_value - turned_nearer(system, b, row, turning) - pulled(system, b, row, base)
     whole = ways[0] * by_value
     for a in range(3):
         for e in range(3):
@@ -184,7 +179,7 @@ def carriage(system, lane, c, ways, state, solver):
         for j in range(n):
             by = leaning(system, b, vector(work.modes, i, SHAPE), vector(work.implied, row + j, 0))
             add_to_matrix(solver.fresh, k, system.tree[b, FIRST] + j, mass * by)
-    if system.bodies[b, STIFFENS] > 0.0:
+    if system.tree[b, SHORTENED]:
         stiffen(system, b, pull_along(system, lane, c, along, work), ways, state, solver)
 
 
@@ -256,13 +251,12 @@ def implied(system, b, j, along, ways, work):
 
 
 @called
-def stiffen(system, b, along, ways, state, solver):
-    """A force along the track at the place that was looked up last pulls at it up to there, where it grows shorter as
-    it bends."""
+def stiffen(system, b, pull, ways, state, solver):
+    """A force at the place that was looked up last, which comes nearer as the body bends."""
     n, first = system.tree[b, MODES], system.tree[b, FIRST]
     for i in range(n):
         for j in range(n):
-            by = -1.0 * foreshortening_at(system, b, i * system.track.shape[4] + j, solver.work) * along
+            by = -1.0 * pulled_nearer(system, b, i * system.track.shape[4] + j, pull, solver.work)
             add_to(state.residual, first + i, by * lanes_at(state.tried.y, (first + j,)))
             add_to_matrix(solver.fresh, first + i, first + j, ways[0] * by)
 
@@ -281,8 +275,8 @@ def load(system, lane, q, ways, state, solver):
         for j in range(n):
             other = shared_vector(system.grip_modes, p * widest + j, TWISTED)
             by = (-0.5 * weight) * dot(cross(other, turned), about)
-            if system.bodies[b, STIFFENS] > 0.0:
-                by = by + system.grip_shorter[p, i, j] * f[0]
+            if system.tree[b, SHORTENED]:
+                by = by + weighed(system.grip_shorter, p, system.tree[b, SHORTENED], (i, j), f)
             left = left + by * lanes_at(state.tried.y, (first + j,))
             add_to_matrix(solver.fresh, first + i, first + j, ways[0] * by)
         add_to(state.residual, first + i, left)

@@ -18,17 +18,17 @@ SOUND, NOT_CONVERGED, DIVERGED, OVER_THE_END = 0, 1, 2, 3
 LARGEST, LARGEST_AT, SMALLEST, SMALLEST_AT, SQUARES, STATISTICS = 0, 1, 2, 3, 4, 5
 
 # columns of System.tree: the parent, -1 for the ground; first elastic coordinate and their number; first joint, and the
-# one behind the last; 1 where nothing moves the frame
-PARENT, FIRST, MODES, FIRST_JOINT, END_JOINT, RESTS, TREE = 0, 1, 2, 3, 4, 5, 6
+# one behind the last; 1 where nothing moves the frame; along how many axes, x first, places come nearer by 1/2 q G q
+PARENT, FIRST, MODES, FIRST_JOINT, END_JOINT, RESTS, SHORTENED, TREE = 0, 1, 2, 3, 4, 5, 6, 7
 # columns of System.bodies: integrals of dm, c dm, c c^T dm; where it hangs on the parent's undeformed body, and the
-# axes there; length of the track and where that begins; whether the track grows shorter as it bends
-MASS, MOMENT, SECOND, PLACE, TURNED, LENGTH, ORIGIN, STIFFENS, BODY = 0, 1, 4, 13, 16, 25, 26, 29, 30
+# axes there; length of the track and where that begins
+MASS, MOMENT, SECOND, PLACE, TURNED, LENGTH, ORIGIN, BODY = 0, 1, 4, 13, 16, 25, 26, 29
 # columns of System.modes, row b n + i: integrals of phi_i dm and c phi_i^T dm; displacement and rotation, by mode i of
 # the parent, of the place where body b hangs
 TRANSLATION, FIRST_ORDER, HANGING_SHAPE, HANGING_TURN, MODE = 0, 3, 12, 15, 18
-# columns of System.pairs, row (b n + i) n + j: integral of phi_i phi_j^T dm; stiffness; int G dm and int x G dm with
-# G(x) = int_0^x (v_i' v_j' + w_i' w_j'); modal mass
-SECOND_ORDER, STIFFNESS, STIFFENING, MODAL_MASS, PAIR = 0, 9, 10, 12, 13
+# columns of System.pairs, row (b n + i) n + j: integral of phi_i phi_j^T dm; stiffness; integrals of G dm and G c^T dm;
+# modal mass
+SECOND_ORDER, STIFFNESS, NEARING, NEARING_MOMENT, MODAL_MASS, PAIR = 0, 9, 10, 13, 22, 23
 # columns of System.joint_table: kind, first coordinate or -1 where its motion is given, the number of that motion or
 # -1; a joint with both is controlled towards the motion
 KIND, COORDINATE, MOTION = 0, 1, 2
@@ -60,10 +60,10 @@ class System(NamedTuple):
     tree (B, TREE), bodies (B, BODY), modes (B n, MODE), pairs (B n n, PAIR): bodies, each after its parent.
     joint_table (J, 3), axes (J, 3): joints, those of a body side by side, from its parent outward.
     track (B, cells, 6, 6, n): displacements and rotations of each mode along straight tracks, as polynomials of degree
-    5 in equal cells; bends (B, 6, n): which of them are not zero; foreshortening (B, cells, 6, n n): G likewise;
-    hanging_shorter (B, n, n): G, of the parent's modes, where each body hangs. riders (C, 4).
+    5 in equal cells; bends (B, 6, n): which of them are not zero; foreshortening (B, cells, 6, A, n n): G likewise;
+    hanging_shorter (B, A, n, n): G, of the parent's modes, where each body hangs. riders (C, 4).
     gripped (P): bodies of grips, -1 for the ground; grips (P, GRIPS), grip_modes (P n, GRIP_MODE); grip_shorter
-    (P, n, n): G there times weight. load_table (Q, 3); links (K, 2): grips between which springs are.
+    (P, A, n, n): G there times weight. load_table (Q, 3); links (K, 2): grips between which springs are.
     points (P, 3 + 3 n), pointed (P): places whose position over the ground is observed, and their bodies.
     readings (S, N): of sensors, per coordinate; read_under (S, 3): the carriage under which one reads, or -1; the
     component that it reads there; 0, 1 or 2 for coordinates, velocities or accelerations. smooth (K): signals that

@@ -12,11 +12,11 @@ from engine.kernels.floating.layout import (
     IN_BODY,
     MODES,
     PUSHED,
-    STIFFENS,
+    SHORTENED,
     TWISTED,
     WEIGHT,
 )
-from engine.kernels.floating.tracks import combined, nearer, shorter_by
+from engine.kernels.floating.tracks import combined, nearer, shorter_by, span_of
 from engine.kernels.floating.vectors import (
     add,
     add_vector,
@@ -68,8 +68,8 @@ def push(system, p, f, x, work, out):
     add_vector(work.frames, b, TORQUE, times(-1.0, cross(arm(system, p, x), f)))
     for i in range(n):
         r = dot(shared_vector(system.grip_modes, p * widest + i, PUSHED), f)
-        if system.bodies[b, STIFFENS] > 0.0:  # the track up to there grows shorter as it bends
-            r = r - shorter_by(system.grip_shorter, p, i, n, x.y, first) * f[0]
+        if system.tree[b, SHORTENED]:
+            r = r - shorter_by(system.grip_shorter, p, span_of(system, b), i, x.y, f)
         add_to(out, first + i, -1.0 * r)
 
 
@@ -91,8 +91,8 @@ def arm(system, p, x):
     b, row = system.gripped[p], p * system.track.shape[4]
     n, first = system.tree[b, MODES], system.tree[b, FIRST]
     d = add(combined(system.grip_modes, row, PUSHED, n, x.y, first), shared_vector(system.grips, p, ARM))
-    if system.bodies[b, STIFFENS] > 0.0:
-        d = (d[0] - 0.5 * nearer(system.grip_shorter, p, n, x.y, x.y, first), d[1], d[2])
+    if system.tree[b, SHORTENED]:
+        d = add(d, times(-0.5, nearer(system.grip_shorter, p, span_of(system, b), x.y, x.y)))
     return d
 
 
@@ -129,8 +129,8 @@ def over_ground_at(system, p, x, work):
         return add(no_vector(), shared_vector(system.grips, p, ARM)), no_vector()
     n, first = system.tree[b, MODES], system.tree[b, FIRST]
     d, rate = arm(system, p, x), combined(system.grip_modes, row, PUSHED, n, x.u, first)
-    if system.bodies[b, STIFFENS] > 0.0:
-        rate = (rate[0] - nearer(system.grip_shorter, p, n, x.y, x.u, first), rate[1], rate[2])
+    if system.tree[b, SHORTENED]:
+        rate = add(rate, times(-1.0, nearer(system.grip_shorter, p, span_of(system, b), x.y, x.u)))
     v = add(vector(work.frames, b, VELOCITY), add(cross(vector(work.frames, b, SPIN), d), rate))
     E = matrix(work.frames, b, ATTITUDE)
     return add(vector(work.frames, b, POSITION), turned_out(E, d)), turned_out(E, v)

@@ -1,6 +1,6 @@
 """Shapes of a body at places of its track that depend on the state, from polynomials in cells."""
 
-from engine.kernels.floating.layout import LENGTH, MODES
+from engine.kernels.floating.layout import FIRST, LENGTH, MODES, SHORTENED
 from engine.kernels.jit import called
 from engine.kernels.layout import LANES
 from engine.kernels.vector import all_lanes, lanes_at, put_lanes
@@ -53,33 +53,66 @@ def shapes_at(system, b, s, components, work):
 
 
 @called
-def foreshortening_at(system, b, pair, work):
-    """G of a pair of modes at the place whose cells were entered last, 1/(kg m): up to there the track is shorter by
+def foreshortening_at(system, b, axis, pair, work):
+    """G along an axis of a pair of modes at the place whose cells were entered last, 1/(kg m): that comes nearer by
     half of sum G_ij q_i q_j."""
     c, x, found = work.gathered, lanes_at(work.gathered, (WITHIN,)), all_lanes(0.0)
     for power in range(POWERS - 1, -1, -1):
         for j in range(LANES):
-            c[power, j] = system.foreshortening[b, work.cells[j], power, pair]
+            c[power, j] = system.foreshortening[b, work.cells[j], power, axis, pair]
         found = found * x + lanes_at(c, (power,))
     return found
 
 
 @called
-def shorter_by(table, place, i, n, q, first):
-    """sum_j G_ij q_j at a place of a table (places, n, n)."""
-    found = all_lanes(0.0)
-    for j in range(n):
-        found = found + table[place, i, j] * lanes_at(q, (first + j,))
+def pulled_nearer(system, b, pair, pull, work):
+    """G there times a force, along the axes along which it comes nearer."""
+    found = foreshortening_at(system, b, 0, pair, work) * pull[0]
+    if system.tree[b, SHORTENED] > 1:
+        found = found + foreshortening_at(system, b, 1, pair, work) * pull[1]
+        found = found + foreshortening_at(system, b, 2, pair, work) * pull[2]
     return found
 
 
 @called
-def nearer(table, place, n, q, p, first):
-    """sum_ij G_ij q_i p_j there: a place comes nearer to its track's beginning by half of that of q and q."""
-    found = all_lanes(0.0)
-    for i in range(n):
-        found = found + lanes_at(q, (first + i,)) * shorter_by(table, place, i, n, p, first)
+def span_of(system, b):
+    """Of a body: along how many axes its places come nearer, its first elastic coordinate, and how many it has."""
+    return system.tree[b, SHORTENED], system.tree[b, FIRST], system.tree[b, MODES]
+
+
+@called
+def weighed(table, place, axes, pair, f):
+    """G of a pair of modes at a place of a table (places, A, n, n) times a vector, along so many axes."""
+    i, j = pair
+    found = table[place, 0, i, j] * f[0]
+    if axes > 1:
+        found = found + table[place, 1, i, j] * f[1] + table[place, 2, i, j] * f[2]
     return found
+
+
+@called
+def shorter_by(table, place, span, i, q, f):
+    """sum_j G_ij q_j there times a vector; span: as of `span_of`."""
+    axes, first, n = span
+    found = all_lanes(0.0)
+    for j in range(n):
+        found = found + weighed(table, place, axes, (i, j), f) * lanes_at(q, (first + j,))
+    return found
+
+
+@called
+def nearer(table, place, span, q, p):
+    """sum_ij G_ij q_i p_j there: a place comes nearer by half of that of q and q."""
+    axes, first, n = span
+    x, y, z = all_lanes(0.0), all_lanes(0.0), all_lanes(0.0)
+    for i in range(n):
+        for j in range(n):
+            both = lanes_at(q, (first + i,)) * lanes_at(p, (first + j,))
+            x = x + table[place, 0, i, j] * both
+            if axes > 1:
+                y = y + table[place, 1, i, j] * both
+                z = z + table[place, 2, i, j] * both
+    return x, y, z
 
 
 @called

@@ -7,9 +7,9 @@ from scipy.optimize import brentq
 
 import studies
 from engine.bodies.beam.beam import Beam
-from engine.floating.bodies import elastic_body
-from engine.floating.elastic import ABOUT_Y, Z
-from engine.floating.static_shapes import BENDING, FORCE, MOMENT, deflections
+from engine.floating.bodies.build import elastic_body
+from engine.floating.bodies.fields import ABOUT_Y, Z
+from engine.floating.bodies.static_shapes import BENDING, FORCE, MOMENT, deflections
 from engine.scene.frames import Frame
 from engine.scene.study import load
 from studies.commands.catalogue import built_in

@@ -11,8 +11,9 @@ from scipy.optimize import brentq
 from engine.bodies.beam.beam import Beam
 from engine.bodies.frame.assembly import assemble, cross_matrix
 from engine.bodies.frame.frame import Frame as FrameBody
-from engine.floating.bodies import elastic_body
-from engine.floating.elastic import ElasticBody, X
+from engine.floating.bodies.build import elastic_body
+from engine.floating.bodies.elastic import ElasticBody
+from engine.floating.bodies.fields import X
 from engine.scene.frames import Frame
 from results_schema.quantities import QUANTITIES
 from tests.floating.bodies.test_frames_of_beams import PORTAL, STEEL

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from engine.bodies.modal.flexibility import Flexibility
-    from engine.floating.elastic_beam import Part
+    from engine.floating.bodies.beam import Part
 
 FORCE, MOMENT, PULL = 3, 2, 1  # the derivative of a deflection that jumps where one acts; PULL: towards the beginning
 BENDING, STRETCHING = 4, 2  # orders of the equations of beams

@@ -5,31 +5,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from engine.bodies.frame.geometry import unit
+from engine.floating.bodies.fields import AXES, Along, Z
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
 
 if TYPE_CHECKING:
     from engine.bodies.modal.modal_body import ModalBody
+    from engine.floating.bodies.shortening import Shortening
     from engine.scene.frames import Frame
     from results_schema.quantities import Quantity
 
 #: Cells of the tables along a track: polynomials of degree 5 are off by (k h)^6/720 of a shape of wave number k, 1e-12
 #: of the tenth mode of a beam.
 CELLS = 256
-AXES = 6  # displacements x, y, z and rotations about them
-X, Y, Z, ABOUT_X, ABOUT_Y, ABOUT_Z = range(AXES)
-
-
-class Along(Protocol):
-    """Displacements and rotations along a track."""
-
-    def fields(self, x: Array, orders: Sequence[int]) -> Array:
-        """(orders, S, 6, N) derivatives by x of displacements and rotations of every mode at places (S,) m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,10 +30,10 @@ class ElasticBody:
     """A body with its track along x, N modes of unit modal mass, and G places of its mass.
 
     mass kg, length m; omega (N,) rad/s. places (G, 3) m and weights (G,) kg; shapes (G, 3, N) there, kg^(-1/2).
-    own_inertia (3,): kg m2 that the places do not have. along: what moves along the track. slender: whether all of its
-    mass lies there. rolls: whether its rotation about the track is known. bent (S,) -> (S, N, N): v_i' v_j' + w_i' w_j'
-    along the track, and its derivative, where the track grows shorter as it bends. modal: the body at rest, which knows
-    its section; None of what does not bend.
+    own_inertia (3,): kg m2 that the places do not have. along: what moves along the track. shortening:
+    displacements of second order, None where they are not known; stiffens: whether marches have them. modal: the body
+    at rest, which knows its section; None of what does not bend. slender: whether it is a beam, which its frame holds
+    where its track begins. rolls: whether its rotation about the track is known.
     """
 
     length: float
@@ -51,10 +44,16 @@ class ElasticBody:
     shapes: Array
     own_inertia: Array
     along: Along
-    stiffens: bool
     modal: ModalBody | None
+    shortening: Shortening | None = None
+    stiffens: bool = False
     slender: bool = True
     rolls: bool = True
+
+    @property
+    def shortened(self) -> int:
+        """Along how many axes marches have displacements of second order."""
+        return self.shortening.axes if self.shortening is not None and self.stiffens else 0
 
     def fields(self, x: Array, orders: Sequence[int]) -> Array:
         """(orders, S, 6, N) derivatives by x of displacements and rotations of every mode at places (S,) m."""
@@ -75,41 +74,21 @@ class ElasticBody:
         return hermite(self.fields(x, (0, 1, 2)), self.length / CELLS)
 
     def foreshortening(self) -> Array:
-        """(cells, 6, N N): G(x) = int_0^x (v_i' v_j' + w_i' w_j') as polynomials; zero where it is not asked for."""
+        """(cells, 6, A, N, N): G along A axes as polynomials; along none where marches do not have it."""
         n = self.omega.size
-        if not self.stiffens:
-            return np.zeros((CELLS, 6, n * n))
-        x = np.linspace(0.0, self.length, CELLS + 1)
-        nodes, weights = np.polynomial.legendre.leggauss(6)
-        inner = (x[:-1, None] + 0.5 * (nodes + 1.0) * (self.length / CELLS)).reshape(-1)
-        rates = self.bent(inner)[0].reshape(CELLS, nodes.size, n, n)
-        within = np.einsum("g,cgij->cij", weights, rates) * (0.5 * self.length / CELLS)
-        whole = np.concatenate([np.zeros((1, n, n)), np.cumsum(within, axis=0)])
-        values = np.stack([whole, *self.bent(x)])
-        return hermite(values, self.length / CELLS).reshape(CELLS, 6, n * n)
+        if self.shortening is None or not self.stiffens:
+            return np.zeros((CELLS, 6, 0, n, n))
+        values = self.shortening.along(np.linspace(0.0, self.length, CELLS + 1))
+        return hermite(values, self.length / CELLS).reshape(CELLS, 6, self.shortening.axes, n, n)
 
-    def stiffening(self) -> tuple[Array, Array]:
-        """(N, N) twice: integrals of G dm and x G dm; zero where they are not asked for."""
-        n = self.omega.size
-        if not self.stiffens:
-            return np.zeros((n, n)), np.zeros((n, n))
-        order = np.argsort(self.places[:, 0])
-        x, dm = self.places[order, 0], self.weights[order]
-        nodes, weights = np.polynomial.legendre.leggauss(8)
-        ends = np.concatenate([[0.0], x])
-        spans = np.diff(ends)
-        inner = (ends[:-1, None] + 0.5 * (nodes + 1.0) * spans[:, None]).reshape(-1)
-        rates = self.bent(inner)[0].reshape(x.size, nodes.size, n, n)
-        whole = np.cumsum(np.einsum("g,x,xgij->xij", weights, 0.5 * spans, rates), axis=0)
-        return np.einsum("x,xij->ij", dm, whole), np.einsum("x,x,xij->ij", dm, x, whole)
 
-    def bent(self, x: Array) -> tuple[Array, Array]:
-        """(S, N, N) twice: v_i' v_j' + w_i' w_j', and its derivative."""
-        one, two = self.fields(x, (1, 2))
-        across = slice(Y, Z + 1)
-        rate = np.einsum("sai,saj->sij", one[:, across], one[:, across])
-        change = np.einsum("sai,saj->sij", two[:, across], one[:, across])
-        return rate, change + np.swapaxes(change, 1, 2)
+#: What bodies are told that have no such key.
+WORDS = {
+    "lateral_modes": "this body bends in all directions by its own modes",
+    "axial_modes": "this body bends and stretches by its own modes",
+    "torsion_modes": "this body bends and twists by its own modes",
+    "stiffening": "bodies out of finite-element files do not stiffen as they turn",
+}
 
 
 def floating_axes(tangent: Array, direction: Array) -> Array:
@@ -119,12 +98,12 @@ def floating_axes(tangent: Array, direction: Array) -> Array:
     return np.stack([x, np.cross(z, x), z])
 
 
-def refuse_beam_words(frame: Frame, where: str) -> None:
-    """Raise BadInput for what is said of beams alone, for a body at a dotted key."""
-    for key in ("lateral_modes", "axial_modes", "stiffening"):
+def refuse_beam_words(frame: Frame, where: str, *keys: str) -> None:
+    """Raise BadInput for what is said of beams alone, and for other keys, for a body at a dotted key."""
+    for key in ("lateral_modes", "axial_modes", "torsion_modes", *keys):
         if getattr(frame, key):
             raise BadInput(
-                "this body bends in all directions by its own modes, and does not stiffen as it turns",
+                WORDS[key],
                 where=f"frame.{where.split('.')[1]}.{key}",
                 expected="left out",
             )

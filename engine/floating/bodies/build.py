@@ -14,15 +14,15 @@ from engine.bodies.frame.frame import Frame as FrameBody
 from engine.bodies.imported.imported import Ansys, Matrices, Nastran
 from engine.bodies.modal.description import MAX_MODES
 from engine.bodies.rigid.rigid import Rigid
-from engine.floating.elastic import Y, Z
-from engine.floating.elastic_beam import elastic_beam, rigid_body
-from engine.floating.elastic_frame import elastic_frame
-from engine.floating.elastic_imported import elastic_imported
+from engine.floating.bodies.beam import elastic_beam, rigid_body
+from engine.floating.bodies.fields import Y, Z
+from engine.floating.bodies.frame import elastic_frame
+from engine.floating.bodies.imported import elastic_imported
 from results_schema.errors import BadInput
 
 if TYPE_CHECKING:
     from engine.bodies.modal.description import Body
-    from engine.floating.elastic import ElasticBody
+    from engine.floating.bodies.elastic import ElasticBody
     from engine.scene.frames import Frame
 
 PROBED = 65  # places along a track at which it is looked for what a mode moves

@@ -12,18 +12,9 @@ from engine.bodies.imported.body import motion_of_nodes, told_along
 from engine.bodies.imported.imported import Imported
 from engine.bodies.imported.line import LineRecovered, LineShapes, spline_slopes
 from engine.bodies.imported.model import HeldModel
-from engine.floating.elastic import (
-    ABOUT_Y,
-    ABOUT_Z,
-    AXES,
-    ElasticBody,
-    Y,
-    Z,
-    floating_axes,
-    refuse_beam_words,
-    refuse_unheld,
-)
-from engine.floating.static_shapes import Motions
+from engine.floating.bodies.elastic import ElasticBody, floating_axes, refuse_beam_words, refuse_unheld
+from engine.floating.bodies.fields import ABOUT_Y, ABOUT_Z, AXES, Y, Z
+from engine.floating.bodies.static_shapes import Motions
 from engine.scene.frames import Frame
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
@@ -40,7 +31,7 @@ class NodeLine:
     components: tuple[LineShapes, ...]
 
     def fields(self, x: Array, orders: Sequence[int]) -> Array:
-        """As of `engine.floating.elastic.Along`."""
+        """As of `engine.floating.bodies.elastic.Along`."""
         found = np.zeros((len(orders), x.size, AXES, self.components[0].ends.shape[1]))
         rows = [component.derivatives(x, range(HIGHEST + 1)) for component in self.components]
         for number, order in enumerate(orders):
@@ -54,7 +45,7 @@ class NodeLine:
 def elastic_imported(body: Imported, frame: Frame, modes: int | None, where: str, hung: Sequence[float]) -> ElasticBody:
     """A solid model in its floating frame, which begins with its track; modes: where that is open; hung: places of its
     track (m) at which torques act. Raises BadInput."""
-    refuse_beam_words(frame, where)
+    refuse_beam_words(frame, where, "stiffening")
     asked = body if body.modes != "auto" or modes is None else body.with_modes(modes)
     own = asked.model_copy(update={"rigid_body_modes": "drop"})
     held, motion = motion_of_nodes(own)
@@ -89,7 +80,6 @@ def elastic_imported(body: Imported, frame: Frame, modes: int | None, where: str
         shapes=moved,
         own_inertia=np.zeros(3),
         along=_line(line.places, shapes[track]),
-        stiffens=False,
         modal=modal,
         slender=False,
         rolls=False,

@@ -1,9 +1,9 @@
-"""Beams that bend in two planes and stretch, and rigid bodies, in floating frames."""
+"""Beams that bend in two planes, stretch and twist, and rigid bodies, in floating frames."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Protocol
@@ -13,8 +13,10 @@ import numpy as np
 from engine.bodies.beam.beam import Beam
 from engine.bodies.beam.modes import uniform_beam
 from engine.bodies.rigid.rigid import Rigid
-from engine.floating.elastic import ABOUT_Y, ABOUT_Z, AXES, ElasticBody, X, Y, Z
-from engine.floating.static_shapes import BENDING, STRETCHING, Law, with_statics
+from engine.floating.bodies.elastic import ElasticBody
+from engine.floating.bodies.fields import ABOUT_X, ABOUT_Y, ABOUT_Z, AXES, X, Y, Z
+from engine.floating.bodies.shortening import BeamShortening
+from engine.floating.bodies.static_shapes import BENDING, STRETCHING, Law, with_statics
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
 
@@ -53,7 +55,7 @@ class Parts:
     parts: tuple[Part, ...]
 
     def fields(self, x: Array, orders: Sequence[int]) -> Array:
-        """As of `engine.floating.elastic.Along`."""
+        """As of `engine.floating.bodies.elastic.Along`."""
         found = np.zeros((len(orders), x.size, AXES, sum(part.omega.size for part in self.parts)))
         first = 0
         for part in self.parts:
@@ -98,14 +100,15 @@ class Bending:
 
 
 @dataclass(frozen=True, eq=False)
-class Stretching:
-    """sin k x, the far end free; or cos k x, where the near one is free too (phase 1)."""
+class Bar:
+    """Stretching along x or twisting about it: sin k x, the far end free; or cos k x, where the near one is free too
+    (phase 1)."""
 
     omega: Array
     wave_number: Array
     amplitude: float
     phase: int
-    axis: int = X
+    axis: int
     about: int | None = None
     sense: float = 0.0
 
@@ -126,31 +129,33 @@ def elastic_beam(body: Beam, frame: Frame, modes: int | None, where: str, hung: 
         )
     count = int(body.modes) if body.modes != "auto" else int(modes or 0)
     x, dx = _gauss([0.0, *hung, body.length])
-    places, dm = np.zeros((x.size, 3)), body.mass_per_length * dx
-    places[:, 0] = x
+    dm, lateral_moment = body.mass_per_length * dx, frame.lateral_second_moment or body.second_moment
+    polar = (body.second_moment + lateral_moment) / body.area
     modal: list[tuple[Part, Law]] = [_bending(body, count, Z)]
     if frame.lateral_modes:
         lateral = body.model_copy(update={"second_moment": frame.lateral_second_moment})
         modal.append(_bending(lateral, frame.lateral_modes, Y))
     if frame.axial_modes:
-        modal.append(_stretching(body, frame.axial_modes))
-    parts = [with_statics(part, law, hung, x, dm) for part, law in modal]
-    lateral_moment = frame.lateral_second_moment or body.second_moment
-    turning = body.density * body.length * (body.second_moment + lateral_moment)
+        modal.append(_bar(body, frame.axial_modes, X, body.mass, body.youngs_modulus * body.area))
+    if frame.torsion_modes:
+        stiffness = float(frame.shear_modulus or 0.0) * float(frame.torsion_constant or 0.0)
+        modal.append(_bar(body, frame.torsion_modes, ABOUT_X, polar * body.mass, stiffness))
+    inertia = {ABOUT_X: polar * dm}
+    along = Parts(tuple(with_statics(part, law, hung, x, inertia.get(part.axis, dm)) for part, law in modal))
     whirls = any(joint.freedoms > 1 for joint in frame.joints)
-    found = ElasticBody(
+    out = np.sqrt(2.0 * np.array([lateral_moment, body.second_moment]) / body.area)
+    particles = _around(along, x, dm, out) if frame.torsion_modes else _on_line(along, x, dm)
+    return ElasticBody(
         body.length,
         body.mass,
-        np.concatenate([part.omega for part in parts]),
-        places,
-        dm,
-        np.zeros((x.size, 3, 0)),
-        np.array([turning if whirls else 0.0, 0.0, 0.0]),
-        Parts(tuple(parts)),
-        frame.stiffening,
+        np.concatenate([part.omega for part in along.parts]),
+        *particles,
+        np.array([polar * body.mass if whirls and not frame.torsion_modes else 0.0, 0.0, 0.0]),
+        along,
         body.build(),
+        BeamShortening(along, x, dm),
+        frame.stiffening,
     )
-    return _with_shapes(found)
 
 
 def _gauss(bounds: Sequence[float]) -> tuple[Array, Array]:
@@ -163,11 +168,6 @@ def _gauss(bounds: Sequence[float]) -> tuple[Array, Array]:
     )
 
 
-def _with_shapes(body: ElasticBody) -> ElasticBody:
-    """The same with its shapes at the places of its mass."""
-    return replace(body, shapes=body.fields(body.places[:, 0], (0,))[0, :, : Z + 1])
-
-
 def _bending(beam: Beam, count: int, axis: int) -> tuple[Bending, Law]:
     """The lowest modes that bend; those as a rigid body are the frame's own."""
     rigid = uniform_beam(beam, 2).rigid_modes
@@ -176,15 +176,33 @@ def _bending(beam: Beam, count: int, axis: int) -> tuple[Bending, Law]:
     return Bending(beam, axis, omega, rigid), law
 
 
-def _stretching(beam: Beam, count: int) -> tuple[Stretching, Law]:
-    """Axial modes, the far end free, the near one held unless both ends of the beam are free."""
+def _bar(beam: Beam, count: int, axis: int, inertia: float, stiffness: float) -> tuple[Bar, Law]:
+    """Modes along or about x, the far end free, the near one held unless both ends of the beam are free; inertia: kg or
+    kg m2 of the whole beam, stiffness: E A or G J."""
     number = np.arange(1, count + 1)
     free = beam.ends == ("free", "free")
     k = np.asarray((number if free else number - 0.5) * np.pi / beam.length)
-    speed = np.sqrt(beam.youngs_modulus / beam.density)
-    stiffness = beam.youngs_modulus * beam.area / beam.length
-    law = Law(STRETCHING, ("free" if free else "clamped", "free"), stiffness, beam.length)
-    return Stretching(k * speed, k, float(np.sqrt(2.0 / beam.mass)), int(free)), law
+    speed = np.sqrt(stiffness * beam.length / inertia)
+    law = Law(STRETCHING, ("free" if free else "clamped", "free"), stiffness / beam.length, beam.length)
+    return Bar(k * speed, k, float(np.sqrt(2.0 / inertia)), int(free), axis), law
+
+
+def _on_line(along: Parts, x: Array, dm: Array) -> tuple[Array, Array, Array]:
+    """Places, masses and shapes of particles on the track."""
+    places = np.zeros((x.size, 3))
+    places[:, 0] = x
+    return places, dm, along.fields(x, (0,))[0, :, : Z + 1]
+
+
+def _around(along: Parts, x: Array, dm: Array, out: Array) -> tuple[Array, Array, Array]:
+    """The same of four around each place, out (2,) m along y and z, which turn as it twists."""
+    centre, _, _ = _on_line(along, x, dm)
+    moved, parts = along.fields(x, (0,))[0], []
+    for arm in np.concatenate([np.diag([0.0, *out])[1:], -np.diag([0.0, *out])[1:]]):
+        turned = np.cross([1.0, 0.0, 0.0], arm)[:, None] * moved[:, ABOUT_X, None]
+        parts.append((centre + arm, 0.25 * dm, moved[:, : Z + 1] + turned))
+    places, masses, shapes = zip(*parts, strict=True)
+    return np.concatenate(places), np.concatenate(masses), np.concatenate(shapes)
 
 
 def rigid_body(body: Rigid, frame: Frame, modes: int | None, where: str, hung: Sequence[float]) -> ElasticBody:
@@ -201,6 +219,5 @@ def rigid_body(body: Rigid, frame: Frame, modes: int | None, where: str, hung: S
         none,
         np.array(inertia),
         Parts(()),
-        False,
         None,
     )
