@@ -31,7 +31,7 @@ ROOMS = (
         "engine.march",
         "engine.accuracy",
     ),
-    *("engine.floating", "engine.robots"),
+    *("engine.floating.bodies", "engine.floating", "engine.robots"),
     *("engine.batch", "engine.methods", "engine.unreduced"),
     *("studies.results", "studies.protocol", "studies.findings", "studies.at_rest", "studies.precision"),
     *("studies.moving", "studies.robots"),
