@@ -227,8 +227,7 @@ def _system(model: FloatingModel) -> System:
     numbers = np.zeros((B, columns.BODY))
     modes, pairs = np.zeros((B, n, columns.MODE)), np.zeros((B, n, n, columns.PAIR))
     most = max(1, *(body.shortened for body in model.bodies.values()))
-    track, shorter = np.zeros((B, CELLS, 6, 6, n)), np.zeros((B, CELLS, 6, most, n, n))
-    hanging_shorter = np.zeros((B, most, n, n))
+    track, hanging_shorter = np.zeros((B, CELLS, 6, 6, n)), np.zeros((B, most, n, n))
     joint = 0
     for b, (name, body) in enumerate(model.bodies.items()):
         own = sum(one.body == name for one in model.joints)
@@ -240,8 +239,8 @@ def _system(model: FloatingModel) -> System:
         _hang(model, name, numbers[b], modes[b], hanging_shorter[b])
         if N:
             track[b, ..., :N] = body.track()
-            shorter[b, :, :, : body.shortened, :N, :N] = body.foreshortening()
     loads, tips = list(enumerate(model.loads)), tip_tables(model, n)
+    shortening, foreshortening = _foreshortening(model)
     grips = [*(load.grip for load in model.loads), *(grip for link in model.links for grip in link)]
     return System(
         tree,
@@ -252,7 +251,8 @@ def _system(model: FloatingModel) -> System:
         np.array([j.axis for j in model.joints], dtype=np.float64).reshape(-1, 3),
         track,
         np.any(track != 0.0, axis=(1, 2)),
-        shorter.reshape(B, CELLS, 6, most, n * n),
+        shortening,
+        foreshortening,
         hanging_shorter,
         _riders(model, names),
         *grip_tables(list(model.bodies.values()), grips, n, most),
@@ -299,6 +299,20 @@ def _fill_integrals(body: ElasticBody, numbers: Array, modes: Array, pairs: Arra
         pairs[:, :, columns.NEARING : columns.NEARING + A] = np.moveaxis(whole, 0, -1)
         turned = moments.reshape(3 * A, *moments.shape[2:])
         pairs[:, :, columns.NEARING_MOMENT : columns.NEARING_MOMENT + 3 * A] = np.moveaxis(turned, 0, -1)
+
+
+def _foreshortening(model: FloatingModel) -> tuple[Counts, Array]:
+    """(K, 4) and (K, cells, 6) of the bodies on which carriages are."""
+    ridden = {carriage.on for carriage in model.study.carriage.values()}
+    rows, tables = [np.zeros((0, 4), dtype=np.int64)], [np.zeros((0, CELLS, 6))]
+    for b, (name, body) in enumerate(model.bodies.items()):
+        if name in ridden and body.shortened:
+            values = np.moveaxis(body.foreshortening(), (0, 1), (3, 4))
+            most = np.abs(values).max(axis=(3, 4))
+            felt = np.argwhere(np.triu(most > ROUNDING * most.max()))
+            rows.append(np.insert(felt, 0, b, axis=1))
+            tables.append(values[tuple(felt.T)])
+    return np.concatenate(rows), np.concatenate(tables)
 
 
 def _hang(model: FloatingModel, name: str, numbers: Array, modes: Array, shorter: Array) -> None:

@@ -71,8 +71,10 @@ TERMS = {
 LINEARISED = {
     "stiffening by turning": (" - turned_nearer(system, b, row, turning)", ""),
     "stiffening by accelerations": (" - pulled(system, b, row, base)", ""),
-    "stiffening by carriages": ("by * lanes_at(state.tried.y, (first + j,)))", "0.0 * by)"),
-    "stiffening by carriages in the step": ("ways[0] * by)\n\n", "0.0 * by)\n\n"),
+    "stiffening by carriages": ("add_to(state.residual, i, by * lanes_at(state.tried.y, (j,)))", "pass"),
+    "stiffening by carriages, twice": ("add_to(state.residual, j, by * lanes_at(state.tried.y, (i,)))", "pass"),
+    "stiffening by carriages in the step": ("add_to_matrix(solver.fresh, i, j, ways[0] * by)", "pass"),
+    "stiffening by carriages in the step, twice": ("add_to_matrix(solver.fresh, j, i, ways[0] * by)", "pass"),
     "stiffening by loads": ("by = by + weighed(system.grip_shorter, p, system.tree[b, SHORTENED], (i, j), f)", "pass"),
     "torques of loads": ("weight * dot(turned, about)", "0.0"),
     "turned torques": ("(-0.5 * weight) * dot(cross(other, turned), about)", "0.0 * about[0]"),

@@ -9,13 +9,15 @@ from engine.kernels.floating.layout import (
     HEIGHT,
     INERTIA,
     MODES,
+    ONE,
     ORIGIN,
+    OTHER,
     OWN_MASS,
     PLACE_COORDINATE,
     PLACE_MOTION,
     RESTS,
     RIDDEN,
-    SHORTENED,
+    SHORTER,
     SLIP,
     SPRING,
     SPRUNG_COORDINATE,
@@ -156,14 +158,16 @@ def pull_along(system, lane, c, along, work):
 def push_modes(system, b, x, work, forces, out):
     """A force of a carriage on the modes at its place; where that comes nearer as the body bends, what pulls at the
     undeformed one through that too."""
-    n, first, widest = system.tree[b, MODES], system.tree[b, FIRST], system.track.shape[4]
-    f, pull = forces
-    for i in range(n):
-        r = dot(vector(work.modes, i, SHAPE), f)
-        if system.tree[b, SHORTENED]:
-            for j in range(n):
-                r = r - pulled_nearer(system, b, i * widest + j, pull, work) * lanes_at(x.y, (first + j,))
-        add_to(out, first + i, r)
+    first, (f, pull) = system.tree[b, FIRST], forces
+    for i in range(system.tree[b, MODES]):
+        add_to(out, first + i, dot(vector(work.modes, i, SHAPE), f))
+    for k in range(system.shortening.shape[0]):
+        if system.shortening[k, SHORTER] == b:
+            i, j = first + system.shortening[k, ONE], first + system.shortening[k, OTHER]
+            pulled = -1.0 * pulled_nearer(system, k, pull, work)
+            add_to(out, i, pulled * lanes_at(x.y, (j,)))
+            if i != j:
+                add_to(out, j, pulled * lanes_at(x.y, (i,)))
 
 
 @called

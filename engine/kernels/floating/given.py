@@ -19,12 +19,15 @@ from engine.kernels.floating.layout import (
     FIRST_ORDER,
     GRIP,
     MODES,
+    ONE,
+    OTHER,
     OWN_MASS,
     PUSHED,
     RESTS,
     RIDDEN,
     SECOND_ORDER,
     SHORTENED,
+    SHORTER,
     SPRING,
     SPRUNG_COORDINATE,
     SPRUNG_MASS,
@@ -253,12 +256,16 @@ def implied(system, b, j, along, ways, work):
 @called
 def stiffen(system, b, pull, ways, state, solver):
     """A force at the place that was looked up last, which comes nearer as the body bends."""
-    n, first = system.tree[b, MODES], system.tree[b, FIRST]
-    for i in range(n):
-        for j in range(n):
-            by = -1.0 * pulled_nearer(system, b, i * system.track.shape[4] + j, pull, solver.work)
-            add_to(state.residual, first + i, by * lanes_at(state.tried.y, (first + j,)))
-            add_to_matrix(solver.fresh, first + i, first + j, ways[0] * by)
+    first = system.tree[b, FIRST]
+    for k in range(system.shortening.shape[0]):
+        if system.shortening[k, SHORTER] == b:
+            i, j = first + system.shortening[k, ONE], first + system.shortening[k, OTHER]
+            by = -1.0 * pulled_nearer(system, k, pull, solver.work)
+            add_to(state.residual, i, by * lanes_at(state.tried.y, (j,)))
+            add_to_matrix(solver.fresh, i, j, ways[0] * by)
+            if i != j:
+                add_to(state.residual, j, by * lanes_at(state.tried.y, (i,)))
+                add_to_matrix(solver.fresh, j, i, ways[0] * by)
 
 
 @called

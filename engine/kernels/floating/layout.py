@@ -45,6 +45,8 @@ OWN_MASS, INERTIA, HEIGHT, SPRUNG_MASS, SPRING, DAMPER, DRIVE, VISCOUS, COULOMB,
 WEIGHT, ARM, GRIPS = 0, 1, 4
 PUSHED, TWISTED, GRIP_MODE = 0, 3, 6
 GRIP, IN_BODY, COURSE = 0, 1, 2
+# columns of System.shortening
+SHORTER, AXIS, ONE, OTHER = 0, 1, 2, 3
 # columns of System.tips: the sensor, and the body; of System.tip_places: the undeformed place in the frame, the
 # direction over the ground in which it is read, zero where the length is, and displacements by the modes, one after the
 # other
@@ -60,7 +62,8 @@ class System(NamedTuple):
     tree (B, TREE), bodies (B, BODY), modes (B n, MODE), pairs (B n n, PAIR): bodies, each after its parent.
     joint_table (J, 3), axes (J, 3): joints, those of a body side by side, from its parent outward.
     track (B, cells, 6, 6, n): displacements and rotations of each mode along straight tracks, as polynomials of degree
-    5 in equal cells; bends (B, 6, n): which of them are not zero; foreshortening (B, cells, 6, A, n n): G likewise;
+    5 in equal cells; bends (B, 6, n): which of them are not zero. shortening (K, 4): a body with carriages, an axis and
+    two modes, each pair once, whose G is not zero; foreshortening (K, cells, 6): that likewise;
     hanging_shorter (B, A, n, n): G, of the parent's modes, where each body hangs. riders (C, 4).
     gripped (P): bodies of grips, -1 for the ground; grips (P, GRIPS), grip_modes (P n, GRIP_MODE); grip_shorter
     (P, A, n, n): G there times weight. load_table (Q, 3); links (K, 2): grips between which springs are.
@@ -84,6 +87,7 @@ class System(NamedTuple):
     axes: FloatArray
     track: FloatArray
     bends: BoolArray
+    shortening: IntArray
     foreshortening: FloatArray
     hanging_shorter: FloatArray
     riders: IntArray

@@ -1,6 +1,6 @@
 """Shapes of a body at places of its track that depend on the state, from polynomials in cells."""
 
-from engine.kernels.floating.layout import FIRST, LENGTH, MODES, SHORTENED
+from engine.kernels.floating.layout import AXIS, FIRST, LENGTH, MODES, SHORTENED
 from engine.kernels.jit import called
 from engine.kernels.layout import LANES
 from engine.kernels.vector import all_lanes, lanes_at, put_lanes
@@ -53,25 +53,28 @@ def shapes_at(system, b, s, components, work):
 
 
 @called
-def foreshortening_at(system, b, axis, pair, work):
+def foreshortening_at(system, number, work):
     """G along an axis of a pair of modes at the place whose cells were entered last, 1/(kg m): that comes nearer by
     half of sum G_ij q_i q_j."""
-    c, x, found = work.gathered, lanes_at(work.gathered, (WITHIN,)), all_lanes(0.0)
-    for power in range(POWERS - 1, -1, -1):
-        for j in range(LANES):
-            c[power, j] = system.foreshortening[b, work.cells[j], power, axis, pair]
-        found = found * x + lanes_at(c, (power,))
-    return found
+    c, table = work.gathered, system.foreshortening
+    for j in range(LANES):  # one number of each lane: six rows of them take three times as long
+        cell, x, found = work.cells[j], c[WITHIN, j], 0.0
+        for power in range(POWERS - 1, -1, -1):
+            found = found * x + table[number, cell, power]
+        c[0, j] = found
+    return lanes_at(c, (0,))
 
 
 @called
-def pulled_nearer(system, b, pair, pull, work):
-    """G there times a force, along the axes along which it comes nearer."""
-    found = foreshortening_at(system, b, 0, pair, work) * pull[0]
-    if system.tree[b, SHORTENED] > 1:
-        found = found + foreshortening_at(system, b, 1, pair, work) * pull[1]
-        found = found + foreshortening_at(system, b, 2, pair, work) * pull[2]
-    return found
+def pulled_nearer(system, number, pull, work):
+    """G there times the part of a force along its axis."""
+    axis = system.shortening[number, AXIS]
+    part = pull[0]
+    if axis == 1:
+        part = pull[1]
+    if axis == 2:
+        part = pull[2]
+    return foreshortening_at(system, number, work) * part
 
 
 @called
