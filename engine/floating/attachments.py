@@ -42,10 +42,12 @@ class GripTables(NamedTuple):
 
 
 class TipTables(NamedTuple):
-    """tips (T, 2): sensors and bodies; places (T, 6 + 3 n); carrying (L): the bodies of these arms."""
+    """tips (T, 2): sensors and bodies; places (T, 6 + 3 n); shorter (T, A, n, n); carrying (L): the bodies of these
+    arms."""
 
     tips: Counts
     places: Array
+    shorter: Array
     carrying: Counts
 
 
@@ -126,12 +128,14 @@ def grip_tables(bodies: Sequence[ElasticBody], grips: Sequence[Grip], n: int, ax
     return GripTables(gripped, table, modes.reshape(-1, columns.GRIP_MODE), pairs)
 
 
-def tip_tables(model: FloatingModel, n: int) -> TipTables:
-    """The tables of `engine.kernels.floating.layout.System` of places whose distance from the rigid arm is read."""
+def tip_tables(model: FloatingModel, n: int, axes: int) -> TipTables:
+    """The tables of `engine.kernels.floating.layout.System` of places whose distance from the rigid arm is read; axes:
+    along which places come nearer."""
     names, sensors = list(model.bodies), list(model.study.sensor)
     places = np.zeros((len(model.tips), columns.TIP_SHAPES + 3 * n))
+    shorter = np.zeros((len(model.tips), axes, n, n))
     tips, carrying = [], set[str]()
-    for row, (name, sensor) in zip(places, model.tips.items(), strict=True):
+    for row, own, (name, sensor) in zip(places, shorter, model.tips.items(), strict=True):
         on, x = str(sensor.body), float(sensor.at or 0.0)
         body = model.bodies[on]
         row[columns.TIP_PLACE] = x
@@ -139,10 +143,11 @@ def tip_tables(model: FloatingModel, n: int) -> TipTables:
         if N := body.omega.size:
             fields = body.fields(np.array([x]), (0,))[0, 0, :3]
             row[columns.TIP_SHAPES : columns.TIP_SHAPES + 3 * N] = fields.T.reshape(-1)
+            own[: body.shortened, :N, :N] = shorter_at(body, np.array([x]))[0]
         tips.append((sensors.index(name), names.index(on)))
         carrying.update(model.carriers(on))
     rows = np.array(tips, dtype=np.int64).reshape(-1, 2)
-    return TipTables(rows, places, np.array(sorted(map(names.index, carrying)), dtype=np.int64))
+    return TipTables(rows, places, shorter, np.array(sorted(map(names.index, carrying)), dtype=np.int64))
 
 
 def shorter_at(body: ElasticBody, x: Array) -> Array:

@@ -44,8 +44,8 @@ def system_of(model: FloatingModel) -> System:
         _hang(model, name, numbers[b], modes[b], hanging_shorter[b])
         if N:
             track[b, ..., :N] = body.track()
-    loads, tips = list(enumerate(model.loads)), tip_tables(model, n)
-    shortening, foreshortening = _foreshortening(model)
+    loads, tips = list(enumerate(model.loads)), tip_tables(model, n, most)
+    (shortening, foreshortening), (points, point_shorter) = _foreshortening(model), _ends(model, n, most)
     grips = [*(load.grip for load in model.loads), *(grip for link in model.links for grip in link)]
     return System(
         tree,
@@ -67,11 +67,13 @@ def system_of(model: FloatingModel) -> System:
         ).reshape(-1, 3),
         len(model.loads) + np.arange(2 * len(model.links)).reshape(-1, 2),
         np.arange(B, dtype=np.int64),
-        _ends(model, n),
+        points,
+        point_shorter,
         *_readings(model),
         _smooth(model),
         tips.tips,
         tips.places,
+        tips.shorter,
         tips.carrying,
         _drives(model),
         np.array([np.any(body.shapes != 0.0, axis=(0, 2)) for body in model.bodies.values()]).reshape(B, 3),
@@ -154,15 +156,17 @@ def _riders(model: FloatingModel, names: list[str]) -> Counts:
     return np.array(rows, dtype=np.int64).reshape(-1, 4)
 
 
-def _ends(model: FloatingModel, n: int) -> Array:
-    """The far ends of all tracks."""
-    found = np.zeros((len(model.bodies), 3 + 3 * n))
+def _ends(model: FloatingModel, n: int, axes: int) -> tuple[Array, Array]:
+    """The far ends of all tracks, and G there."""
+    found, shorter = np.zeros((len(model.bodies), 3 + 3 * n)), np.zeros((len(model.bodies), axes, n, n))
     for b, body in enumerate(model.bodies.values()):
         found[b, 0] = body.length
         if body.omega.size:
             fields = body.fields(np.array([body.length]), (0,))[0, 0, :3]
-            found[b, 3 : 3 + 3 * body.omega.size] = fields.T.reshape(-1)
-    return found
+            N = body.omega.size
+            found[b, 3 : 3 + 3 * N] = fields.T.reshape(-1)
+            shorter[b, : body.shortened, :N, :N] = shorter_at(body, np.array([body.length]))[0]
+    return found, shorter
 
 
 def _drives(model: FloatingModel) -> Counts:

@@ -67,12 +67,13 @@ class System(NamedTuple):
     hanging_shorter (B, A, n, n): G, of the parent's modes, where each body hangs. riders (C, 4).
     gripped (P): bodies of grips, -1 for the ground; grips (P, GRIPS), grip_modes (P n, GRIP_MODE); grip_shorter
     (P, A, n, n): G there times weight. load_table (Q, 3); links (K, 2): grips between which springs are.
-    points (P, 3 + 3 n), pointed (P): places whose position over the ground is observed, and their bodies.
+    points (P, 3 + 3 n), pointed (P): places whose position over the ground is observed, and their bodies;
+    point_shorter (P, A, n, n): G there.
     readings (S, N): of sensors, per coordinate; read_under (S, 3): the carriage under which one reads, or -1; the
     component that it reads there; 0, 1 or 2 for coordinates, velocities or accelerations. smooth (K): signals that
     have extremes between stations.
-    tips (T, 2), tip_places (T, 6 + 3 n): places whose distance from the rigid arm is read; carrying (L): the bodies of
-    these arms, each after its parent.
+    tips (T, 2), tip_places (T, 6 + 3 n): places whose distance from the rigid arm is read; tip_shorter (T, A, n, n): G
+    there; carrying (L): the bodies of these arms, each after its parent.
     drives (D, 2): sensors that read what drives exert, and their joints.
     leans (B, 3): whether a body's modes move it along its x, y and z; pairing (K, 3): bodies, and two of their modes
     that act on each other. given: whether steps take frames and places of carriages as given in time, and need no
@@ -99,11 +100,13 @@ class System(NamedTuple):
     links: IntArray
     pointed: IntArray
     points: FloatArray
+    point_shorter: FloatArray
     readings: FloatArray
     read_under: IntArray
     smooth: IntArray
     tips: IntArray
     tip_places: FloatArray
+    tip_shorter: FloatArray
     carrying: IntArray
     drives: IntArray
     leans: BoolArray

@@ -18,6 +18,7 @@ from engine.kernels.floating.layout import (
     OWN_MASS,
     RIDDEN,
     SECOND_ORDER,
+    SHORTENED,
     SPRING,
     SPRUNG_COORDINATE,
     SPRUNG_MASS,
@@ -30,7 +31,17 @@ from engine.kernels.floating.layout import (
     TRANSLATION,
 )
 from engine.kernels.floating.loads import between
-from engine.kernels.floating.tracks import SHAPE, SLOPE, TURN, TURN_SLOPE, combined, combined_there, shapes_at
+from engine.kernels.floating.tracks import (
+    SHAPE,
+    SLOPE,
+    TURN,
+    TURN_SLOPE,
+    combined,
+    combined_there,
+    nearer,
+    shapes_at,
+    span_of,
+)
 from engine.kernels.floating.vectors import (
     add,
     axial,
@@ -86,6 +97,8 @@ def observe(system, lane, x, work, by, out):
         for i in range(system.tree[b, MODES]):
             moved = lanes_at(x.y, (system.tree[b, FIRST] + i,))
             d = add(d, times(moved, shared_vector(system.points, p, 3 + 3 * i)))
+        if system.tree[b, SHORTENED]:
+            d = add(d, times(-0.5, nearer(system.point_shorter, p, span_of(system, b), x.y, x.y)))
         keep(out, first, over_ground(work.frames, b, d))
         first += OF_POINT
     for d in range(system.drives.shape[0]):
@@ -137,6 +150,8 @@ def position_error(system, t, x, work):
     for i in range(system.tree[b, MODES]):
         moved = lanes_at(x.y, (system.tree[b, FIRST] + i,))
         d = add(d, times(moved, shared_vector(system.tip_places, t, TIP_SHAPES + 3 * i)))
+    if system.tree[b, SHORTENED]:
+        d = add(d, times(-0.5, nearer(system.tip_shorter, t, span_of(system, b), x.y, x.y)))
     apart = add(over_ground(work.frames, b, d), times(-1.0, told))
     if dot(way, way) > 0.0:
         return dot(apart, way)

@@ -176,3 +176,21 @@ def test_it_lacks_the_stiffness_of_a_beam() -> None:
     one, other = (lacking(build(study(body, TURNS)), "portal") for body in (arm(3), beam))
     assert one == pytest.approx(other, rel=1e-5, abs=1e-9)
     assert other[2] > 0.05
+
+
+@pytest.mark.parametrize("kind", ["beam", "frame"])
+def test_ends_and_position_errors_come_nearer(kind: str) -> None:
+    """By half of int w'^2 of what the arm bends by, along a track that rests, as its weight sets it swinging."""
+    body = {"beam": ARM | {"modes": 2, "own_weight": True}, "frame": arm(2)}[kind]
+    sensor = {"tip": {"body": "portal", "at": 10.0}}
+    sensor["off"] = {"body": "portal", "at": 10.0, "quantity": "position_error", "direction": "x"}
+    found = {}
+    for on in (False, True):
+        model, marched = steps(study(body, {"stiffening": on}, sensor=sensor, gravity=0.5), 2.0, 4000, 40, FOX_GOODWIN)
+        ends, read = history(model, marched, "ends", 0, 3), history(model, marched, "sensors", 0, 2)
+        found[on] = ends[:, 0], read[:, 1], read[:, 0]
+    end, error, tip = found[True]
+    assert found[False][1] == pytest.approx(np.zeros(101), abs=1e-12)
+    assert end - end[0] == pytest.approx(error, abs=1e-12)
+    # its first mode alone, nearly: by 1.16 w^2/(2 L)
+    assert error == pytest.approx(-0.581 * tip**2 / 10.0, abs=2e-2 * np.abs(error).max())
