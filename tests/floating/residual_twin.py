@@ -233,7 +233,7 @@ TERMS = {
     "f on the frame": ("    add_vector(work.frames, b, FORCE, f)\n", ""),
     "d x f on the frame": ("    add_vector(work.frames, b, TORQUE, cross(d, f))\n", ""),
     "torque on the frame": ("        add_vector(work.frames, b, TORQUE, about)\n", ""),
-    "phi^T f": ("r = dot(vector(work.modes, i, SHAPE), f)", "r = no_vector()[0]"),
+    "phi^T f": ("add_to(out, first + i, dot(vector(work.modes, i, SHAPE), f))", "pass"),
     "psi^T t": ("add_to(out, first + i, dot(spin_of(t, vector(at, i, TURN)), about))", "pass"),
     "tangent . f": ("dot(tangent, f) - along_track", "-along_track"),
     "psi' q . t": ("add_to(out, k, dot(spin_of(t, combined_there(at, TURN_SLOPE, n, x.y, first)), about))", "pass"),
