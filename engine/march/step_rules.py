@@ -87,13 +87,13 @@ def alias_steps(model: SceneModel, time_scale: Array) -> Array:
 
 def _alias_root(scheme: Scheme, wave: float, angle: Array) -> Array:
     """(V,) steps n at which wave/n + phase(angle/n) = pi, found once: a march, its reference and its audit all ask."""
-    return np.frombuffer(_alias_roots(scheme, wave, angle.tobytes()))
+    return np.frombuffer(_alias_roots((scheme, wave, angle.tobytes())))
 
 
 @lru_cache(maxsize=256)
-def _alias_roots(scheme: Scheme, wave: float, angles: bytes) -> bytes:
+def _alias_roots(asked: tuple[Scheme, float, bytes]) -> bytes:
     """The same of bytes: the left side falls with n, so bisection finds the root."""
-    angle = np.frombuffer(angles)
+    scheme, wave, angle = *asked[:2], np.frombuffer(asked[2])
     low, high = np.zeros_like(angle), np.full_like(angle, 60.0)
     for _ in range(60):
         middle = 0.5 * (low + high)
