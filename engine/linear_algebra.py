@@ -7,6 +7,7 @@ one thread only as long as ours computes, and then get back what they had.
 
 from __future__ import annotations
 
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -20,17 +21,26 @@ class _Held:
         self.lock = threading.Lock()
         self.holders = 0
         self.threads: dict[str, tuple[Any, int]] = {}
+        self.loaded: list[Any] = []
+        self.modules = 0
 
     def take(self) -> None:
         """Hold all libraries that are loaded by now to one thread."""
-        from threadpoolctl import ThreadpoolController
-
         with self.lock:
             self.holders += 1
-            for library in ThreadpoolController().select(user_api="blas").lib_controllers:
+            for library in self._libraries():
                 if library.filepath not in self.threads:
                     self.threads[library.filepath] = library, library.num_threads
                     library.set_num_threads(1)
+
+    def _libraries(self) -> list[Any]:
+        """Those that are loaded by now. They come with modules, and to look through all of a process takes long."""
+        from threadpoolctl import ThreadpoolController
+
+        if self.modules != len(sys.modules):
+            self.loaded = ThreadpoolController().select(user_api="blas").lib_controllers
+            self.modules = len(sys.modules)
+        return self.loaded
 
     def give_back(self) -> None:
         """The last holder gives all libraries the threads that they had."""

@@ -61,6 +61,7 @@ ONLY_IN = {
 }
 
 
+@cache
 def modules() -> dict[str, ast.Module]:
     """All our modules by name, parsed."""
     found = {}
@@ -87,28 +88,30 @@ def imports(tree: ast.AST, besides: tuple[type[ast.AST], ...] = ()) -> Iterator[
         yield from imports(node, besides)
 
 
-MODULES = modules()
-IMPORTS = {name: set(imports(tree)) for name, tree in MODULES.items()}
+@cache
+def imported() -> dict[str, set[str]]:
+    """What each of them imports."""
+    return {name: set(imports(tree)) for name, tree in modules().items()}
 
 
 def test_everything_is_found() -> None:
-    assert len(MODULES) > 40
+    assert len(modules()) > 40
     assert (
-        "engine.study_file.document" in IMPORTS["engine.scene.study"]
-        and "results_schema.errors" in IMPORTS["engine.scene.study"]
+        "engine.study_file.document" in imported()["engine.scene.study"]
+        and "results_schema.errors" in imported()["engine.scene.study"]
     )
 
 
 def test_packages_import_downwards() -> None:
-    for name, found in IMPORTS.items():
+    for name, found in imported().items():
         above = PACKAGES[PACKAGES.index(name.partition(".")[0]) + 1 :]
         assert {other for other in found if other.partition(".")[0] in above} == set(), name
 
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_no_module_needs_itself(package: str) -> None:
-    own = {name: {found for found in IMPORTS[name] if found in MODULES and found != name} for name in MODULES}
-    graph = {name: own[name] for name in MODULES if name.partition(".")[0] == package and name != package}
+    own = {name: {found for found in imported()[name] if found in modules() and found != name} for name in modules()}
+    graph = {name: own[name] for name in modules() if name.partition(".")[0] == package and name != package}
     order = list(TopologicalSorter(graph).static_order())  # raises CycleError
     assert set(graph) <= set(order)
 
@@ -118,10 +121,10 @@ def test_chains_of_imports_are_short() -> None:
 
     @cache
     def floors(name: str) -> int:
-        needed = set(imports(MODULES[name], (ast.FunctionDef, ast.AsyncFunctionDef))) & set(MODULES) - {name}
+        needed = set(imports(modules()[name], (ast.FunctionDef, ast.AsyncFunctionDef))) & set(modules()) - {name}
         return 1 + max(map(floors, needed), default=0)
 
-    assert max(map(floors, MODULES)) <= LONGEST_CHAIN
+    assert max(map(floors, modules())) <= LONGEST_CHAIN
 
 
 def room(name: str) -> str:
@@ -130,36 +133,36 @@ def room(name: str) -> str:
 
 
 def test_every_room_is_known() -> None:
-    assert {room(name) for name in MODULES} == set(ROOMS)
+    assert {room(name) for name in modules()} == set(ROOMS)
 
 
 def test_rooms_import_downwards() -> None:
-    place = {name: ROOMS.index(room(name)) for name in MODULES}
+    place = {name: ROOMS.index(room(name)) for name in modules()}
     upwards = [
         f"{name} imports {other}"
-        for name, found in IMPORTS.items()
-        for other in found & set(MODULES) - PUBLIC
+        for name, found in imported().items()
+        for other in found & set(modules()) - PUBLIC
         if place[other] > place[name]
     ]
     assert upwards == []
 
 
 def test_no_room_is_crowded() -> None:
-    files = Counter(room(name) for name in MODULES if name not in ROOMS)
+    files = Counter(room(name) for name in modules() if name not in ROOMS)
     files += Counter(str(path.parent) for path in (ROOT / "tests").rglob("*.py") if path.name != "__init__.py")
     assert {folder for folder, count in files.items() if count > MOST_FILES} == set()
 
 
 def test_kernels_know_numbers_only() -> None:
     allowed = {"numpy", "numba", "llvmlite", *sys.stdlib_module_names}
-    for name in (name for name in MODULES if name.startswith("engine.kernels")):
-        foreign = {found for found in IMPORTS[name] if not found.startswith("engine.kernels")}
+    for name in (name for name in modules() if name.startswith("engine.kernels")):
+        foreign = {found for found in imported()[name] if not found.startswith("engine.kernels")}
         assert {found.partition(".")[0] for found in foreign} <= allowed, name
 
 
 @pytest.mark.parametrize("package", sorted(ONLY_IN))
 def test_packages_stay_where_they_belong(package: str) -> None:
-    users = [name for name, found in IMPORTS.items() if package in {other.partition(".")[0] for other in found}]
+    users = [name for name, found in imported().items() if package in {other.partition(".")[0] for other in found}]
     assert users
     assert [name for name in users if not f"{name}.".startswith(tuple(f"{p}." for p in ONLY_IN[package]))] == []
 

@@ -2,10 +2,11 @@
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 
 import pytest
 
-from tests.test_imports import MODULES
+from tests.test_imports import modules
 
 # Where it is asked all the same, and of what.
 ASKED = {
@@ -25,14 +26,12 @@ ASKED = {
 FIELDS = {"kind", "quantity"}  # names of kinds, which nobody compares with words
 
 
+@cache
 def classes() -> set[str]:
     """Our classes but errors."""
-    found = [node for tree in MODULES.values() for node in ast.walk(tree) if isinstance(node, ast.ClassDef)]
-    errors = {node.name for node in ast.walk(MODULES["results_schema.errors"]) if isinstance(node, ast.ClassDef)}
+    found = [node for tree in modules().values() for node in ast.walk(tree) if isinstance(node, ast.ClassDef)]
+    errors = {node.name for node in ast.walk(modules()["results_schema.errors"]) if isinstance(node, ast.ClassDef)}
     return {node.name for node in found} - errors
-
-
-CLASSES = classes()
 
 
 def names(node: ast.AST) -> set[str]:
@@ -45,7 +44,7 @@ def questions(tree: ast.AST) -> Iterator[str]:
     """Questions after a class, an attribute or the name of a kind."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and len(node.args) > 1:
-            of_class = node.func.id in ("isinstance", "issubclass") and names(node.args[1]) & CLASSES
+            of_class = node.func.id in ("isinstance", "issubclass") and names(node.args[1]) & classes()
             of_attribute = node.func.id in ("getattr", "hasattr") and isinstance(node.args[1], ast.Constant)
             if of_class or of_attribute:
                 yield ast.unparse(node)
@@ -65,17 +64,19 @@ def asked_in(name: str) -> str | None:
     return next((known for known in ASKED if f"{name}.".startswith(f"{known}.")), None)
 
 
-FOUND = {
-    name: list(questions(tree)) for name, tree in MODULES.items() if name.partition(".")[0] in ("engine", "studies")
-}
+@cache
+def all_questions() -> dict[str, list[str]]:
+    """Of every module but those of results, by its name."""
+    ours = ((name, tree) for name, tree in modules().items() if name.partition(".")[0] in ("engine", "studies"))
+    return {name: list(questions(tree)) for name, tree in ours}
 
 
 def test_nobody_asks_of_what_kind_a_thing_is() -> None:
-    assert {name: found for name, found in FOUND.items() if found and asked_in(name) is None} == {}
+    assert {name: found for name, found in all_questions().items() if found and asked_in(name) is None} == {}
 
 
 def test_the_list_is_no_longer_than_it_must_be() -> None:
-    assert {asked_in(name) for name, found in FOUND.items() if found} - {None} == set(ASKED)
+    assert {asked_in(name) for name, found in all_questions().items() if found} - {None} == set(ASKED)
 
 
 @pytest.mark.parametrize(

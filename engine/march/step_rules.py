@@ -13,6 +13,7 @@ most 1.4 with -0.05. Up to omega_c h = 2 pi it was 1.3 at most.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -85,14 +86,21 @@ def alias_steps(model: SceneModel, time_scale: Array) -> Array:
 
 
 def _alias_root(scheme: Scheme, wave: float, angle: Array) -> Array:
-    """(V,) steps n at which wave/n + phase(angle/n) = pi: the left side falls with n, so bisection finds the root."""
+    """(V,) steps n at which wave/n + phase(angle/n) = pi, found once: a march, its reference and its audit all ask."""
+    return np.frombuffer(_alias_roots((scheme, wave, angle.tobytes())))
+
+
+@lru_cache(maxsize=256)
+def _alias_roots(asked: tuple[Scheme, float, bytes]) -> bytes:
+    """The same of bytes: the left side falls with n, so bisection finds the root."""
+    scheme, wave, angle = *asked[:2], np.frombuffer(asked[2])
     low, high = np.zeros_like(angle), np.full_like(angle, 60.0)
     for _ in range(60):
         middle = 0.5 * (low + high)
         steps = np.exp(middle)
         short = wave / steps + scheme.phase(angle / steps) >= math.pi
         low, high = np.where(short, middle, low), np.where(short, high, middle)
-    return np.exp(high)
+    return np.exp(high).tobytes()
 
 
 def allow_any_steps(model: SceneModel, values: VariantValues, steps: Counts) -> None:

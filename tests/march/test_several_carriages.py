@@ -37,7 +37,7 @@ def scene(carriages: Table, bodies: Table, bed: Table | None = None, **changes: 
             sensors[f"{name}_force"] = {"carriage": name, "quantity": "contact_force"}
         for contact in carriage.get("contacts", ()):
             sensors[f"{name}_{contact}"] = {"carriage": name, "contact": contact, "quantity": "contact_force"}
-    solver = {"steps": 4000, "static_correction": False, "scheme": "richardson"}
+    solver = {"steps": 4000, "static_correction": False, "scheme": "richardson", "tolerance": 0.5}
     return study(whole["bed"], carriages, body=whole, sensor=sensors, solver=solver, **changes)
 
 

@@ -16,7 +16,8 @@ from engine.scene.variants import VariantValues
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity
 from tests.engine import twin as twins
-from tests.engine.build import aboard, beam, cruise, fixed, force, mass, oscillator, shuttle, study, swing, under
+from tests.engine.build import aboard, beam, cruise, fixed, force, mass, oscillator, shuttle, swing, under
+from tests.engine.build import study_of_steps as study
 from tests.engine.twin import solve_twin
 from tests.march.test_twin import DAMPED, ENTERING, SPRINGS, case, compare, scheme
 from tests.naive import scene as scenes

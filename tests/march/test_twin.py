@@ -9,7 +9,8 @@ import pytest
 
 from engine.batch.execution import run
 from engine.scene.study import Study
-from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study, swing, under
+from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, swing, under
+from tests.engine.build import study_of_steps as study
 from tests.engine.reading import Reading
 from tests.engine.twin import Twin, march_twin
 

@@ -38,7 +38,9 @@ def marched(bed: dict[str, Any], carriage: dict[str, Any], sensors: dict[str, An
 def test_a_moving_force_by_the_closed_form() -> None:
     """The first three modes of the pinned beam, undamped."""
     sensors = {"rate": read(quantity="velocity"), "bend": read(limit=f"{THREE} Hz")}
-    dataset = engine.run(marched(beam(modes=10), force(3.0, MOTION), sensors, solver={"steps": 40000}))
+    dataset = engine.run(
+        marched(beam(modes=10), force(3.0, MOTION), sensors, solver={"steps": 40000, "tolerance": 0.5})
+    )
     t = dataset.elapsed.values.ravel()[:, None]
     k = np.arange(1, 4)
     own, pushed = (k * np.pi) ** 2, k * np.pi * 0.6

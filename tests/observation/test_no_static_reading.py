@@ -30,7 +30,7 @@ def cantilever(body: str, **changes: Any) -> Study:
 def test_errors_are_told_over_what_is_read_where_nothing_is_read_at_rest(body: str) -> None:
     """Of beams they were told to be 0, and frames, whose 1e-12 N m at rest are rounding, were said to have diverged."""
     found = studies.run(cantilever(body))
-    finer = studies.run(cantilever(body, modes=48).with_values({"solver.steps": 51_200}))
+    finer = studies.run(cantilever(body, modes=48).with_values({"solver.steps": 51_200, "solver.tolerance": 0.5}))
     assert int(found.status) == 0 and np.isnan(found.dynamic_amplification).all()
     largest = float(finer.moment_max)
     assert largest == pytest.approx(90.3, rel=2e-3)

@@ -131,6 +131,7 @@ at = 2.5
 
 [solver]
 steps = 400
+tolerance = 0.5
 audit = 0
 """
 SPEED = 'speed = { of = "train.tram.motion.speed", from = "6 km/h", to = "144 km/h", count = 5 }'

@@ -13,7 +13,8 @@ from engine.unreduced.march import march_unreduced
 from engine.unreduced.scene import Unreduced, unreduced_model
 from engine.unreduced.statics import unreduced_frequencies, unreduced_statics
 from results_schema.errors import BadInput
-from tests.engine.build import beam, course_of, cruise, fixed, force, mass, oscillator, shuttle, study, swing, under
+from tests.engine.build import beam, course_of, cruise, fixed, force, mass, oscillator, shuttle, swing, under
+from tests.engine.build import study_of_steps as study
 
 GRAVITY = 9.81
 SECTION = {"area": 1.0, "second_moment": 1.0, "youngs_modulus": 1.0, "density": 1.0, "fibre_distance": 0.1}
