@@ -318,6 +318,7 @@ def _joined(parts: Sequence[Measured]) -> Measured:
         np.concatenate([part.march + np.int32(first) for part, first in zip(parts, marches, strict=False)], axis=2),
         np.concatenate([part.held for part in parts], axis=2),
         np.concatenate([part.reference for part in parts], axis=1),
+        np.concatenate([part.by_elements for part in parts], axis=1),
         np.any([part.marched for part in parts], axis=0),
         sum(part.work for part in parts),
         np.concatenate([part.spent for part in parts]),

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from engine.accuracy.grids import SceneGrid
 from engine.accuracy.jobs import InTurn, Job, Share
 from engine.accuracy.ladder import ENOUGH, Ladder, March, Rungs
-from engine.accuracy.reference import Converged, Level, as_fixed, converge, in_full, is_free
+from engine.accuracy.reference import Converged, Level, Marches, as_fixed, converge, in_full, is_free, left_by_elements
 from engine.kernels.schemes import Scheme
 from engine.march.outcome import vibration
 from engine.scene.variants import VariantValues
@@ -44,15 +44,17 @@ class Measured:
     """What P pilots found: error (M, R) of every result in each march of a pilot, the first infinite; pilot (M,): whose
     it was; march (columns, cuts, P): the one that tells of a rung, 0 where none does; held (columns, cuts, P): the
     largest of the errors that are held, without what the study itself fixes, over their tolerances; reference (R, P):
-    the errors of the references themselves; marched (columns, cuts): rungs that any has marched; work: modes x steps
-    over a passage or cycle of all their marches; spent (P,): the same of each one's reference; vibration (P,): of
-    cycles; free: whether the study fixes nothing that the references change."""
+    the errors of the references themselves; by_elements (R, P): what the elements of bodies leave besides; marched
+    (columns, cuts): rungs that any has marched; work: modes x steps over a passage or cycle of all their marches with
+    the elements of the study; spent (P,): the same of each one's reference; vibration (P,): of cycles; free: whether
+    the study fixes nothing that the references change."""
 
     error: Array
     pilot: Counts
     march: NDArray[np.int32]
     held: Array
     reference: Array
+    by_elements: Array
     marched: NDArray[np.bool_]
     work: float
     spent: Array
@@ -82,10 +84,10 @@ class Climb:
     def go(self) -> Measured:
         """Find the references of the pilots, what each model and number of modes can do for them, and with how many
         steps. Raises Halted, and Crashed by the places of pilots."""
-        refer = partial(converge, self.grid, self.values, part=REFERENCE_PART, share=self.share)
-        levels = list[Level]()
-        aim = refer(levels=as_fixed(self.grid), seen=levels.append)
-        truth = aim if is_free(self.grid) else refer(levels=in_full(self.grid))
+        refer = partial(converge, part=REFERENCE_PART, share=self.share)
+        levels, full = list[Level](), Marches(self.grid, self.values, in_full(self.grid))
+        aim = refer(self.grid, self.values, as_fixed(self.grid), seen=levels.append)
+        truth = aim if is_free(self.grid) else refer(*full)
         self.rungs = Rungs(self.grid, self.values, self.ladder, self.span, truth, aim, self._judged(levels))
         shape = len(self.ladder.columns), len(self.ladder.cuts), self.values.size
         self.found = [(np.zeros(1, dtype=np.int64), np.full((1, len(truth.error)), np.inf))]
@@ -99,7 +101,7 @@ class Climb:
                 self._take(marches)
         for name, enough in self.enough.items():
             self._fill(name, enough)
-        return self._measured(truth, aim is truth)
+        return self._measured(truth, aim is truth, left_by_elements(full, truth, self.share))
 
     def _judged(self, levels: Sequence[Level]) -> dict[int, Level]:
         """Levels of references that are columns whose modes are judged, by column."""
@@ -107,11 +109,11 @@ class Climb:
         last = self.ladder.columns[-1].scheme
         return {columns[v.numerics]: v for v in levels if v.numerics in columns and v.numerics.scheme == last}
 
-    def _measured(self, truth: Converged, free: bool) -> Measured:
+    def _measured(self, truth: Converged, free: bool, by_elements: Array) -> Measured:
         """What the jobs found."""
         work = float(self.work + truth.spent.sum())
         pilot, error = (np.concatenate(parts) for parts in zip(*self.found, strict=True))
-        errors = error, pilot, self.march, self.held, truth.error, self.marched
+        errors = error, pilot, self.march, self.held, truth.error, by_elements, self.marched
         return Measured(*errors, work, truth.spent, self._vibration(truth), free)
 
     def _vibration(self, truth: Converged) -> Array:

@@ -92,6 +92,11 @@ class SceneGrid:
         for neighbours to tell of."""
         return self.asked.reduction is not None
 
+    @property
+    def is_meshed(self) -> bool:
+        """Whether the study says into how many elements a body is cut."""
+        return any(self.scene.study.body[part.name].is_meshed for part in self.scene.bodies)
+
     def of_pilots(self) -> SceneGrid:
         """The same scene for marches that only measure errors: envelopes at a few places."""
         return replace(self, places=PILOT_PLACES)

@@ -16,7 +16,16 @@ from numpy.typing import NDArray
 from engine.accuracy.grids import MOST_COMPARED
 from engine.accuracy.jobs import InTurn
 from engine.accuracy.ladder import ladder_of
-from engine.accuracy.reference import USUAL_LEVEL, as_fixed, converge, in_full, is_free, level_work
+from engine.accuracy.reference import (
+    USUAL_LEVEL,
+    Marches,
+    as_fixed,
+    converge,
+    in_full,
+    is_free,
+    left_by_elements,
+    level_work,
+)
 from engine.accuracy.results import Result, differences, results_of, tolerances, worst_held
 from engine.kernels.layout import STATISTICS
 from engine.march.outcome import USED, number_of, outcome, used, vibration
@@ -226,9 +235,10 @@ class ConvergingGroup(Group):
     def work(self) -> float:
         levels, values = as_fixed(self.grid), self.grid.values
         own = float(np.mean(level_work(self.grid, values, levels, min(USUAL_LEVEL, len(levels.numerics) - 1))))
+        of_levels = 2.3 if self.grid.is_meshed else 1.3  # the last one again, with twice the elements
         if is_free(self.grid):
-            return 1.3 * own
-        return own + 1.3 * float(np.mean(level_work(self.grid, values, in_full(self.grid), USUAL_LEVEL)))
+            return of_levels * own
+        return own + of_levels * float(np.mean(level_work(self.grid, values, in_full(self.grid), USUAL_LEVEL)))
 
     @property
     def usual_steps(self) -> int:
@@ -247,15 +257,17 @@ class ConvergingGroup(Group):
     ) -> Found:
         asked, results = self.grid.asked, results_of(self.grid.asked)
         levels = as_fixed(self.grid)
-        own = converge(self.grid, values, levels, ANSWER_PART, share=InTurn(halted))
-        tighter = values.tighter
+        share, tighter = InTurn(halted), values.tighter
+        own = converge(self.grid, values, levels, ANSWER_PART, share=share)
         if is_free(self.grid):
-            return Found(own.outcome, own.used, own.error, worst_held(own.error, results, tighter))
+            told = own.error + left_by_elements(Marches(self.grid, values, levels), own, share)
+            return Found(own.outcome, own.used, told, worst_held(own.error, results, tighter))
         apart = np.full(own.error.shape, np.nan)
         if (whole := np.flatnonzero(~lost(own.outcome.status))).size:  # nothing is told of the others
-            truth = converge(self.grid, values.part(whole), in_full(self.grid), TRUTH_PART, share=InTurn(halted))
-            beside = differences(asked, self.scene, values.part(whole), own.outcome.of(whole), truth.outcome)
-            apart[:, whole] = beside + truth.error
+            full = Marches(self.grid, values.part(whole), in_full(self.grid))
+            truth = converge(*full, TRUTH_PART, share=share)
+            beside = differences(asked, self.scene, full.values, own.outcome.of(whole), truth.outcome)
+            apart[:, whole] = beside + truth.error + left_by_elements(full, truth, share)
         left_open = len(levels.numerics) > 1
         held = worst_held(own.error, results, tighter) if left_open else np.zeros(values.size)
         return Found(own.outcome, own.used, apart, held)

@@ -53,7 +53,8 @@ class NeighbourErrors:
     """What pilots at weighted places (D, P) tell their neighbours. error (M, R) told by each of their marches; held (P,
     2, columns x cuts): logarithms, less the planes, of the errors that are held over their tolerances, of those that
     follow the study's and of those that have their own; wanted: the same by which it is decided. told_slopes,
-    held_slopes (D, columns x cuts): of the planes of what is told and of what is held, along the weighted places."""
+    held_slopes (D, columns x cuts): of the planes of what is told and of what is held, along the weighted places.
+    by_elements (P, R): what is told besides of the elements of bodies, on every rung."""
 
     pilots: Array
     error: Array
@@ -61,6 +62,7 @@ class NeighbourErrors:
     wanted: Array
     told_slopes: Array
     held_slopes: Array
+    by_elements: Array
 
     def errors(self, march: Numbers, rung: Numbers, places: Array, neighbours: Numbers) -> Array:
         """(R, V) estimated errors by the marches (columns x cuts, P) of neighbours (V, k) that tell of the rung of a
@@ -69,6 +71,10 @@ class NeighbourErrors:
         for slope, place, pilots in zip(self.told_slopes, places.T, self.pilots, strict=True):
             rises += slope[rung][:, None] * (place[:, None] - pilots[neighbours])
         told_errors(self.error, march, rung, np.exp(rises), neighbours, found)
+        if self.by_elements.any():
+            own, level = np.arange(len(self.by_elements), dtype=np.int32)[None], np.ones(neighbours.shape)
+            told_errors(self.by_elements, own, np.zeros_like(rung), level, neighbours, beside := np.empty_like(found))
+            found += beside
         return found
 
     def worst(self, rung: Numbers, places: Array, neighbours: Numbers, tighter: Array) -> Array:
@@ -97,7 +103,7 @@ def neighbour_errors_of(
     margin = np.where(np.isfinite(tolerances(decisive)), worst_margin, margin)
     error = np.asarray(margin * measured.error + measured.reference.T[measured.pilot])
     planes = _levels(held_slopes, places, whole.shape)
-    if measured.free:  # what is told is what decides
+    if measured.free:  # what is told, but for what elements leave, is what decides
         wanting = margin * measured.error + _settled(measured, decisive, span[0])[measured.pilot]
         held, wanted = (
             _by_rung([worst_held(e.T, part)[measured.march] for part in parts], planes) for e in (error, wanting)
@@ -107,7 +113,8 @@ def neighbour_errors_of(
         matters = [np.isfinite(tolerances(part)).any() for part in parts]
         both = [held_margin * measured.held if own else np.zeros_like(whole) for own in matters]
         held = wanted = _by_rung(both, planes)
-    return NeighbourErrors(places.weighted, error, held, wanted, told_slopes, held_slopes)
+    by_elements = left_out.with_margins(measured.by_elements)
+    return NeighbourErrors(places.weighted, error, held, wanted, told_slopes, held_slopes, by_elements)
 
 
 def slopes(errors: Array, places: Places, telling: tuple[float, float]) -> Array:
@@ -181,6 +188,14 @@ class _LeftOut(NamedTuple):
         tell = measured.error[march[near[0][:, None], others[near[1]]]] * rises[near][:, :, None]
         pairs = zip(own.T, worst_but_one(tell, axis=1).T, strict=True)
         return np.array([margin_of(*pair) for pair in pairs]), margin_of(worst[near], most[near])
+
+    def with_margins(self, error: Array) -> Array:
+        """(P, R) errors (R, P) that no march tells of, each times what it must be multiplied with to be no less than
+        pilots' own by what their neighbours tell."""
+        if not self.others.shape[1] or not error.any():
+            return np.ascontiguousarray(error.T)
+        pairs = zip(error, worst_but_one(error[:, self.others], axis=2), strict=True)
+        return np.ascontiguousarray(error.T * [margin_of(*pair) for pair in pairs])
 
 
 def margin_of(own: Array, told: Array) -> float:

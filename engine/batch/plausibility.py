@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterable, Iterator
 import numpy as np
 
 from engine.accuracy.grids import SceneGrid
-from engine.batch.coarse_meshes import coarse
 from engine.batch.plan import Plan
 from engine.batch.remarks_of_carriages import ends_early, stays_level, unreached
 from engine.bodies.modal.modal_body import ModalBody
@@ -393,6 +392,5 @@ REMARKS = (
     _brief_rest,
     unreached,
     stays_level,
-    coarse,
     ends_early,
 )

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from engine.accuracy.few_pilots import FewPilots
-from engine.accuracy.reference import left_over
+from engine.accuracy.reference import LEFT_BY_ELEMENTS, left_over
 from engine.bodies.modal.description import MAX_MODES
 from engine.floating.converge import MORE_MODES, STATIONS, Level, levels, stations, usual_steps, weights, worst
 from engine.floating.march import march
@@ -38,8 +38,8 @@ FIRST_MODES, MOST_MODES = 2, 32  # of bending, of a beam
 @dataclass(frozen=True, eq=False)
 class Rung:
     """The model of a scene's variants; modes: of bending, where these are open; left_out (R,): largest error of every
-    result, among pilots, by the model and these modes; by_fixed: of pilots by modes that the study fixes, which is told
-    and not held."""
+    result, among pilots, by the model and these modes; by_fixed: of pilots by modes and elements that the study fixes,
+    which is told and not held."""
 
     fidelity: Fidelity
     modes: int
@@ -68,7 +68,7 @@ def choose(study: Study, pilots: VariantValues, duration: Array, longest: float)
     modes, left_out = _enough_modes(own)
     level = next(iter(levels(study, longest, modes)))
     model, results = level.model, results_of(level.model)
-    by_fixed = _by_fixed_modes(own, modes)
+    by_fixed = FewPilots(pilots.columns, _by_fixed_modes(own, modes) + _by_elements(own, modes))
     full = Rung(Fidelity.FRAME, modes, left_out, by_fixed)
     if study.solver.fidelity == "full" or not is_given(model, pilots):
         return full
@@ -112,21 +112,38 @@ def _enough_by(pilots: Pilots, steps: int) -> tuple[int, Array] | None:
         modes, coarse = modes * MORE_MODES, fine
 
 
-def _by_fixed_modes(pilots: Pilots, modes: int) -> FewPilots:
-    """The errors of pilots by modes that the study fixes, from twice and four times as many; modes: where these are
-    open."""
+def _by_fixed_modes(pilots: Pilots, modes: int) -> Array:
+    """(R, P) the errors of pilots by modes that the study fixes, from twice and four times as many; modes: of bodies
+    that leave theirs open."""
     model = build(pilots.study, modes)
     found: Array = np.zeros((len(results_of(model)), pilots.values.size))
     more = _with_more_modes(pilots.study, 2)
     if (pilots.study.body, pilots.study.frame) == (more.body, more.frame):
-        return FewPilots(pilots.values.columns, found)
+        return found
     for factor in FINER:
         fixed, twice, four = with_more_modes(pilots, modes, factor)
         change = differences(model, fixed, twice)
         found = change + left_over(differences(model, twice, four), change)
         if not np.isnan(found).all(axis=1).any():
             break
-    return FewPilots(pilots.values.columns, found)
+    return found
+
+
+def _by_elements(pilots: Pilots, modes: int) -> Array:
+    """(R, P) the errors of pilots by the elements into which the study cuts bodies, from twice as many."""
+    model = build(pilots.study, modes)
+    found: Array = np.zeros((len(results_of(model)), pilots.values.size))
+    bodies = {name: body.with_more_elements(2) for name, body in pilots.study.body.items()}
+    if bodies == pilots.study.body:
+        return found
+    finer = build(pilots.study.model_copy(update={"body": bodies}), modes)
+    for factor in FINER:
+        steps = usual_steps(model, pilots.longest) * factor
+        own, other = (pilots.march(Level(one, steps, steps // STATIONS, UNLIMITED)) for one in (model, finer))
+        found = LEFT_BY_ELEMENTS * differences(model, own, other)
+        if not np.isnan(found).all(axis=1).any():
+            break
+    return np.where(np.isinf(found), np.nan, found)
 
 
 def with_more_modes(pilots: Pilots, modes: int, factor: int) -> Iterator[Outcome]:

@@ -18,6 +18,7 @@ class Numerics(NamedTuple):
 
     fidelity: as `solver.fidelity` ("auto" and "full": all terms that the carriages have). modes: of every body whose
     number is left open; 0: as the study says. more: times the modes of all other bodies, as far as they have them.
+    elements: times those of bodies that the study cuts into some.
 
     >>> from engine.scene.study import Study
     >>> study = Study(kind="passage", solver={"fidelity": "force"})
@@ -30,6 +31,7 @@ class Numerics(NamedTuple):
     static_correction: bool
     modes: int = 0
     more: int = 1
+    elements: int = 1
 
     @property
     def knows_springs(self) -> bool:
@@ -45,6 +47,8 @@ class Numerics(NamedTuple):
     def body(self, study: Study, name: str) -> Body:
         """A body of the study with as many modes as it keeps."""
         body = study.body[name]
+        if self.elements > 1:
+            body = body.with_more_elements(self.elements)
         if name in open_bodies(study):
             return body.with_modes(self.modes) if self.modes else body
         return body.with_more_modes(self.more) if self.more > 1 else body

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from engine.accuracy.reference import LEFT_BY_ELEMENTS
 from engine.kernels.layout import Newmark
 from engine.kernels.schemes import SCHEMES, NewmarkScheme
 from engine.march.stepper import Halted
@@ -21,7 +22,7 @@ from engine.robots.modes import (
     MOST_TIMES,
     missed_part,
     open_bodies,
-    with_finer_modes,
+    with_finer_bodies,
     with_modes,
     with_open_modes,
 )
@@ -131,8 +132,8 @@ class Ladder:
 @dataclass(frozen=True, eq=False)
 class Converged:
     """What a variant reports: its outcome with the model, the error of every result, and the time (s) at which that
-    changed the most by what the larger part of its error is told of, but for modes that the study fixes; steps, its
-    rung; status, which these modes leave as it is."""
+    changed the most by what the larger part of its error is told of, but for what the study fixes; steps, its rung;
+    status, which elements and fixed modes leave as it is."""
 
     model: RobotModel
     outcome: Outcome
@@ -172,10 +173,10 @@ def converge(
 
 def climb(ladder: Ladder, zero: str, halted: Callable[[], bool] = lambda: False) -> Converged:
     """March rung by rung until what is held stays. Raises Halted."""
-    rung = coarser = Rung(0, 0)
+    rung = Rung(0, 0)
     tolerance = ladder.study.solver.tolerance
     level = ladder.level(rung)
-    now = before = marched(level, zero)
+    first = now = marched(level, zero)
     held = are_held(results_of(level.model))
     unknown = np.full(held.size, np.nan)
     by_choice = LEFT_BY_STEPS if ladder.study.solver.steps == "auto" else LEFT_BY_FIXED_STEPS
@@ -193,7 +194,7 @@ def climb(ladder: Ladder, zero: str, halted: Callable[[], bool] = lambda: False)
             break
         if halted():
             raise Halted
-        axis, before, coarser, level = int(finer.steps > rung.steps), now, rung, ladder.level(finer)
+        axis, before, level = int(finer.steps > rung.steps), now, ladder.level(finer)
         now = marched(level, zero)
         apart = alike(differences(level.model, before, now), held)
         told[axis] = left(apart, change[axis], least[axis])
@@ -206,22 +207,21 @@ def climb(ladder: Ladder, zero: str, halted: Callable[[], bool] = lambda: False)
         judged = Status.OK if error[held].max() <= tolerance else Status.TOLERANCE_MISSED
     whole = Status(int(gravest(Status(int(gravest(judged, now.status))), ladder.resting[1])))
     reported, times = now if whole.values_kept else without_values(now), np.where(told[0] > told[1], *when)
-    error = error + by_fixed_modes(ladder, coarser, before, zero, halted)
+    error = error + by_fixed(ladder, first, zero, halted)
     return Converged(level.model, reported, error, times, int(level.times.steps.sum()), rung, whole)
 
 
-def by_fixed_modes(ladder: Ladder, rung: Rung, found: Outcome, zero: str, halted: Callable[[], bool]) -> Array | float:
-    """(results,) the error by modes that a study fixes, at a rung: what twice as many change, and what these miss.
-    Raises Halted."""
-    study = with_finer_modes(ladder.study)
-    if study is None:
-        return 0.0
+def by_fixed(ladder: Ladder, first: Outcome, zero: str, halted: Callable[[], bool]) -> Array:
+    """(results,) the error by what a study fixes of its rails, at the ``first`` rung: what twice the elements, and
+    twice the modes where it fixes these, change, and what the modes miss. Raises Halted."""
     if halted():
         raise Halted
+    study = with_finer_bodies(ladder.study)
     finer = replace(ladder, study=study, coarsest=build(with_open_modes(study, ladder.times * MODES[0])))
-    level = finer.level(rung)
-    changed = alike(differences(level.model, found, marched(level, zero)), are_held(results_of(level.model)))
-    return changed + finer.missed_by(level.model)
+    level = finer.level(Rung(0, 0))
+    changed = alike(differences(level.model, first, marched(level, zero)), are_held(results_of(level.model)))
+    fixes_modes = len(open_bodies(study)) < len(study.body)
+    return LEFT_BY_ELEMENTS * changed + (finer.missed_by(level.model) if fixes_modes else 0.0)
 
 
 def alike(apart: Array, held: Mask) -> Array:

@@ -39,10 +39,11 @@ def with_modes(study: Study, modes: int) -> Study:
     return study.model_copy(update={"body": own})
 
 
-def with_finer_modes(study: Study) -> Study | None:
-    """The study with twice the modes of bodies that fix theirs; None where none does."""
-    own = {name: body.with_more_modes(2) for name, body in study.body.items() if not body.modes_are_open}
-    return study.model_copy(update={"body": {**study.body, **own}}) if own else None
+def with_finer_bodies(study: Study) -> Study:
+    """The study with twice the elements of all bodies, and twice the modes of those that fix theirs."""
+    own = {name: body.with_more_elements(2) for name, body in study.body.items()}
+    own |= {name: body.with_more_modes(2) for name, body in own.items() if not body.modes_are_open}
+    return study.model_copy(update={"body": own})
 
 
 def missed_part(model: RobotModel, resting: Record) -> float:

@@ -171,11 +171,13 @@ def _of_marked(verdict: Verdict, results: Results) -> str:
 
 
 def _more(results: Results) -> str:
-    """What audits have more of. Where frames or robots move, modes that the study fixes stay as they are."""
+    """What audits have more of. Elements stay as the study says; where frames or robots move, so do modes that it
+    fixes."""
     keeps = np.isin(results.dataset["fidelity_used"].values, [int(Fidelity.FRAME), int(Fidelity.GIVEN_FRAME)]).any()
     fixed = [name for name, body in results.study.body.items() if body.modes != "auto"]
     if not (keeps and fixed):
-        return "more of everything"
+        meshed = any(body.is_meshed for body in results.study.body.values())
+        return f"more of everything{' but elements' * meshed}"
     return f"more steps (modes of {listed(fixed[:3])} are fixed)"
 
 

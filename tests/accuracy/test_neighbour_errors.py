@@ -29,8 +29,8 @@ def asked() -> Asked:
     return run_of("passages").plan.asked
 
 
-def measured(error: Array, reference: float = 0.0) -> Measured:
-    """One rung, on which every one of some pilots has the same error (P,) of all results."""
+def measured(error: Array, reference: float = 0.0, by_elements: Array | float = 0.0) -> Measured:
+    """One rung, on which every one of some pilots has the same error (P,) of all results, and by its elements."""
     results = len(results_of(asked()))
     marches = np.vstack([np.full((1, results), np.inf), np.repeat(error[:, None], results, axis=1)])
     return Measured(
@@ -39,6 +39,7 @@ def measured(error: Array, reference: float = 0.0) -> Measured:
         march=np.arange(1, COUNT + 1, dtype=np.int32).reshape(1, 1, COUNT),
         held=(error / TOLERANCE).reshape(1, 1, COUNT),
         reference=np.full((results, COUNT), reference),
+        by_elements=np.zeros((results, COUNT)) + by_elements,
         marched=np.ones((1, 1), dtype=np.bool_),
         work=0.0,
         spent=np.zeros(COUNT),
@@ -93,10 +94,11 @@ def test_what_variants_are_told_is_the_worst_but_one_of_their_neighbours(near: i
     rung, tighter = random.integers(rungs, size=variants).astype(np.int32), random.uniform(0.5, 1.0, variants)
     slope, at, places = (random.normal(size=shape) for shape in ((2, rungs), (2, pilots), (variants, 2)))
     levels = np.log(held) - (at.T @ slope)[:, None]
-    found = NeighbourErrors(at, error, levels, levels, slope, slope)
+    by_elements = np.exp(random.normal(size=(pilots, 3)))
+    found = NeighbourErrors(at, error, levels, levels, slope, slope, by_elements)
     rises = np.exp(np.sum(slope[:, rung].T[:, None] * (places[:, None] - at.T[neighbours]), axis=2))
     told = worst_but_one(error[march[rung[:, None], neighbours]] * rises[:, :, None], axis=1)
-    told = np.where(np.isfinite(told), told, np.nan).T
+    told = np.where(np.isfinite(told), told, np.nan).T + worst_but_one(by_elements[neighbours], axis=1).T
     np.testing.assert_allclose(found.errors(march, rung, places, neighbours), told, rtol=1e-13)
     limited = np.maximum(held[:, 0] / tighter[:, None, None], held[:, 1])[np.arange(variants)[:, None], neighbours]
     of_all = worst_but_one(limited[np.arange(variants), :, rung] * rises, axis=1)
@@ -164,3 +166,15 @@ def test_margins_are_those_of_the_whole_error_where_the_study_fixes_all() -> Non
     found = told_by(given)
     np.testing.assert_allclose(found.error[21], 0.2 * TOLERANCE, rtol=1e-2)
     np.testing.assert_array_equal(held_by(found), 0.0)
+
+
+def test_what_elements_leave_is_told_and_does_not_decide() -> None:
+    """By what their neighbours tell it is no less for nearly all pilots; on its own it misses no promise."""
+    own = 30.0 * TOLERANCE * np.random.default_rng(3).uniform(0.5, 1.0, COUNT)
+    without, given = (measured(np.full(COUNT, 0.1 * TOLERANCE), 0.0, elements) for elements in (0.0, own))
+    found, before, rung = told_by(given), told_by(without), np.zeros(COUNT, dtype=np.int32)
+    around = given.march.reshape(1, COUNT), rung, PLACES.along, others()
+    beside = found.errors(*around) - before.errors(*around)
+    assert np.mean(beside >= own) > 0.95 and np.median(beside / own) < 2.0
+    np.testing.assert_array_equal(held_by(found), held_by(before))
+    np.testing.assert_array_equal(held_by(found, wanted=True), held_by(before, wanted=True))

@@ -86,7 +86,7 @@ def test_estimated_errors_are_no_smaller_than_true_ones(modes: int | str) -> Non
         exact, held = marched(finest, "start"), are_held(results_of(found.model))
         true = differences(found.model, found.outcome, exact)[held]
         assert (true <= found.error[held]).all() and found.status == Status.OK and (true > 1e-5).all()
-        assert modes == 6 or found.error[held].max() <= 1e-2
+        assert modes == 6 or found.error[held].max() <= 2e-2  # with what elements leave, which is told and not held
         off = {name: np.abs(found.outcome.numbers[name] - exact.numbers[name]) for name in OF_DRIVES}
         of_drives = by_drives(found.model, off, exact.numbers)
         assert (of_drives <= found.error[~held]).all() and (found.error[~held] < 0.15).all()

@@ -289,11 +289,14 @@ class Frame(Body):
         )
         return fixed if self.modes == "auto" else fixed.with_modes(times * int(self.modes))
 
+    def with_more_elements(self, times: int) -> Frame:
+        cut = {name: one.model_copy(update={"elements": times * one.elements}) for name, one in self.member.items()}
+        return self.model_copy(update={"member": cut})
+
     def finer(self) -> Frame:
         """With twice the elements too, and more of the modes within a fixed interface."""
-        cut = {name: one.model_copy(update={"elements": 2 * one.elements}) for name, one in self.member.items()}
         body = self.with_more_modes(2) if self.interface else super().finer()
-        return body.model_copy(update={"member": cut})
+        return body.with_more_elements(2)
 
     def outline(self, modal: ModalBody) -> Outline:
         from engine.bodies.frame.outline import frame_outline

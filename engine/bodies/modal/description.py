@@ -231,6 +231,10 @@ class Body(SpecOfKind):
         """Whether the study says into how many elements it is cut."""
         return False
 
+    def with_more_elements(self, times: int) -> Self:
+        """The same body cut into so many times its elements, where the study says into how many."""
+        return self
+
     @property
     def modes_are_open(self) -> bool:
         """Whether the number of its modes is chosen by the tolerance."""
