@@ -5,12 +5,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+import studies
 from engine.accuracy.groups import ConvergingGroup
 from engine.accuracy.results import results_of
 from engine.batch.plan import Plan, make_plan
 from engine.scene.study import Study
 from results_schema.arrays import Array, Counts
 from results_schema.status import Status
+from studies.results.results import Results
+from studies.runs.audit_findings import told_accuracy
 from tests.accuracy.chosen import executed
 from tests.accuracy.passages import axis, passages
 from tests.calibration.elements import MATTERS, draw, errors_of
@@ -81,6 +84,12 @@ def test_elements_make_no_status() -> None:
         errors.append(found.error[held].max())
         assert isinstance(group, ConvergingGroup) and found.held.max() <= 1.0
     assert errors[0] > 2.0 * TOLERANCE and errors[1] < TOLERANCE
+
+
+def test_answers_say_so() -> None:
+    said = [told_accuracy(None, Results.of(studies.run(bridge(elements)))) for elements in (3, 16)]
+    assert "where 1e-3 was asked (what a study fixes itself, such as elements, is told and makes no status)" in said[0]
+    assert "where 1e-3 was asked;" in said[1]
 
 
 def test_bodies_without_elements_are_not_marched_again() -> None:
