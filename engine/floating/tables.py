@@ -77,7 +77,7 @@ def system_of(model: FloatingModel) -> System:
         tips.carrying,
         _drives(model),
         np.array([np.any(body.shapes != 0.0, axis=(0, 2)) for body in model.bodies.values()]).reshape(B, 3),
-        np.argwhere(np.abs(pairs).max(axis=3) > ROUNDING),
+        np.ascontiguousarray(np.argwhere(np.abs(pairs).max(axis=3) > ROUNDING)),
         False,
         model.study.initial == "equilibrium",
     )

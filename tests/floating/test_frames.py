@@ -201,3 +201,11 @@ def test_closed_loops_are_refused() -> None:
     )
     with pytest.raises(BadInput, match="closed loops"):
         build(study)
+
+
+@pytest.mark.parametrize("modes", [1, 3])
+def test_kernels_are_compiled_once_for_all_models(modes: int) -> None:
+    """Their tables are rows after rows, however many there are: another order is another type."""
+    model = build(arm({"stiffening": True, "joints": [SPIN_UP]}, modes=modes))
+    own = {name: part for name, part in model.system._asdict().items() if isinstance(part, np.ndarray)}
+    assert len(own) > 20 and [name for name, part in own.items() if not part.flags.c_contiguous] == []
