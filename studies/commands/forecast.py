@@ -95,8 +95,9 @@ def _converge(plan: Plan, groups: Sequence[Group], halted: Callable[[], bool]) -
 
 def _of_convergence(plan: Plan, looked: Looked, threads: int) -> Forecast:
     """A study whose variants all converge by themselves."""
-    chunks = sum(1 for _ in plan.chunks(None, None))  # each has tables of its own, which take longer than its marches
-    seconds = (looked.seconds * chunks + plan.seconds) / min(threads, chunks)
+    # each has tables of its own, which take longer than its marches, and threads make hardly side by side
+    chunks = sum(1 for _ in plan.chunks(None, None))
+    seconds = looked.seconds * chunks + plan.seconds / min(threads, chunks)
     if not looked.parts:
         less = f"{PATIENCE:.0f} seconds were not enough for a variant to converge: this may take longer"
         return Forecast(plan, "", (), seconds, less)
