@@ -88,7 +88,8 @@ def test_elements_make_no_status() -> None:
 
 def test_answers_say_so() -> None:
     said = [told_accuracy(None, Results.of(studies.run(bridge(elements)))) for elements in (3, 16)]
-    assert "where 1e-3 was asked (what a study fixes itself, as modes, steps or elements, is told and makes no status)" in said[0]
+    why = "what a study fixes itself, as modes, steps or elements, is told and makes no status"
+    assert f"where 1e-3 was asked ({why})" in said[0]
     assert "where 1e-3 was asked;" in said[1]
 
 
