@@ -22,7 +22,7 @@ from engine.scene.study import Study
 from engine.scene.sweep import Axis, Cases, cells_of, expand
 from engine.scene.trains import axle_name
 from engine.scene.variants import VariantValues
-from engine.statics.coupled_modes import coupled_frequencies
+from engine.statics.coupled_modes import CoupledModes, coupled_modes
 from results_schema.arrays import Array
 from studies.commands import planned_numerics as chosen
 from studies.commands.forecast import AROUND, Forecast, forecast
@@ -74,7 +74,7 @@ def _of_variants(parts: Variants, threads: int) -> Preview:
         TextTable(seen.title, chosen.HEADINGS, seen.rows),
     )
     room = f"at most {size(seen.plan.memory_bytes)} of memory and {size(seen.plan.disk_bytes)} on the disk"
-    cost = f"About {duration(seen.seconds)} on {counted(threads, 'thread')}, {room}.{_audit(seen)}"
+    cost = f"About {duration(seen.seconds)} on {counted(threads, 'thread')}, {room}.{_audit(seen)}{_unreduced(plan)}"
     remark = (seen.remark,) if seen.remark else ()
     return Preview(tuple(table for table in tables if table.rows), cost, (*parts.remarks, *remark))
 
@@ -85,6 +85,14 @@ def _audit(seen: Forecast) -> str:
     if wanted == "auto" and not seen.plan.converges and seen.plan.choice is None:
         return ""
     return _audited(audit_size(seen.plan) if wanted == "auto" else min(int(wanted), seen.plan.size), wanted)
+
+
+def _unreduced(plan: Plan) -> str:
+    """That what was foreseen leaves out what may take most."""
+    wanted = min(plan.study.output.unreduced, plan.size)
+    if not wanted:
+        return ""
+    return f" On top of that {counted(wanted, 'variant')} by the unreduced model, seconds to minutes each."
 
 
 def _audited(variants: int, wanted: int | str) -> str:
@@ -236,12 +244,24 @@ def _standing(plan: Plan) -> TextTable:
         low, high = np.clip(tie.rider.range, 0.0, body.length)
         places = np.linspace(low, high, STANDS)
         sag = np.abs(body.influence_at(places, places) * weight(base, values, 0)[0])
-        frequencies = coupled_frequencies(base, values, frozen(base, places), 1) / (2.0 * np.pi)
+        modes = coupled_modes(base, values, frozen(base, places), 1)
         most = f"up to {quantity(float(sag.max()), 'm')}, at {quantity(float(places[sag.argmax()]), 'm')}"
-        rows.append((tie.name, most, f"{spanned(frequencies.ravel())} Hz"))
+        frequencies = spanned(modes.omega.ravel() / (2.0 * np.pi))
+        rows.append((tie.name, most, f"{frequencies} Hz", _damping_with_it(base, values, modes)))
     where = ", in the scene without its sweep" * bool(plan.study.sweep.axes)
-    headings = ("carriage", "static deflection under it alone", "lowest frequency with it")
+    headings = ("carriage", "static deflection under it alone", "lowest frequency with it", "its damping ratio")
     return TextTable(f"Where the first carriage stands{where}", headings, rows)
+
+
+def _damping_with_it(base: SceneModel, values: VariantValues, modes: CoupledModes) -> str:
+    """What damping ratios of the bodies' own modes leave to modes with what rides on them; "" where dampers or sprung
+    carriages damp too."""
+    sprung = any(carriage.suspension is not None for carriage in base.study.carriage.values())
+    if sprung or any(has_dampers(base.study, part.name) for part in base.bodies):
+        return ""
+    rates = np.concatenate([values.damping_rates(part.name, part.modal.omega) for part in base.bodies])
+    by_mode = np.einsum("kv,vskn->vsn", rates, modes.shapes[:, :, : len(rates)] ** 2)
+    return spanned((by_mode / (2.0 * modes.omega)).ravel())
 
 
 def _sweep(study: Study, cases: Cases) -> TextTable:

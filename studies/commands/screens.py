@@ -17,6 +17,7 @@ from studies.results.findings_common import missed_most, remedy
 from studies.results.formatting import counted, listed, number, quantity, spanned
 from studies.results.results import Results
 from studies.runs.audit_findings import told_accuracy, told_audit
+from studies.runs.unreduced import told_unreduced
 
 if TYPE_CHECKING:
     from results_schema.store.archive import Summary
@@ -127,6 +128,7 @@ def show_outcome(outcome: Outcome) -> None:
         _percentiles(results, [_name(one) for one in summary.in_tables(results)][:MOST_ROWS])
     accuracy = told_accuracy(outcome.audit, results)
     paragraphs(*_about_statuses(results), *([f"Accuracy: {accuracy}"] if accuracy else []))
+    paragraphs(*told_unreduced(outcome.unreduced))
     paragraphs(f"{_about_work(outcome)}. Next: wanderlast report {outcome.archive}")
 
 

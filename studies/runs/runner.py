@@ -36,16 +36,17 @@ from studies.protocol.stopping import Stop
 from studies.protocol.study import compared, kind_of
 from studies.results.cells import counts_of
 from studies.results.results import Results
+from studies.runs import unreduced
 from studies.runs.archived import with_first_frequency
 from studies.runs.audit import GROUP, audit_group, audit_group_of_pieces
 from studies.runs.identity import check_unchanged, files_of, run_key
 from studies.runs.not_audited import why_none, why_none_of_pieces
 from studies.runs.provenance import attributes
-from studies.runs.unreduced import unreduced_group
 
 Progress = Callable[[int, int], None]
 CHANGES_SHOWN = 3  # of the keys by which an archive's study differs
 AUDITING = "audit: some variants once more with more of everything"
+UNREDUCED = "some variants once more by the unreduced finite-element model"
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +55,7 @@ class Outcome:
 
     results: the archive's root. resumed: variants (of a study that measures: pieces) that an earlier start had
     finished. was_finished: there was nothing to do. seconds: of this run. remarks: what is worth knowing about a study
-    that was run. audit: the archive's group, where variants were audited.
+    that was run. audit, unreduced: the archive's groups, where variants were audited and computed unreduced.
     """
 
     archive: Path
@@ -64,6 +65,7 @@ class Outcome:
     seconds: float
     remarks: tuple[str, ...] = ()
     audit: xr.Dataset | None = None
+    unreduced: xr.Dataset | None = None
 
 
 def run_to_archive(
@@ -105,7 +107,9 @@ def run_to_archive(
             root = _as_declared(parts.gather(store), study)
             groups = groups_beside(parts, root, work)
         seconds = _write(run, root, store, groups)
-    return Outcome(archive, root, resumed, False, seconds, tuple(parts.remarks), groups.get(GROUP))
+    return Outcome(
+        archive, root, resumed, False, seconds, tuple(parts.remarks), groups.get(GROUP), groups.get(unreduced.GROUP)
+    )
 
 
 def _unheard(words: object) -> None:
@@ -140,7 +144,9 @@ def _of_variants(parts: Variants, root: xr.Dataset, work: Work) -> Mapping[str, 
     models = model_groups(plan.base)
     if plan.study.output.keeps_variants:
         models = with_first_frequency(models, Results(root, plan.study))
-    return models | unreduced_group(plan, root, work.check) | audit
+    if plan.study.output.unreduced:
+        work.stage(UNREDUCED)
+    return models | unreduced.unreduced_group(plan, root, work.check) | audit
 
 
 @groups_beside.register
@@ -174,8 +180,9 @@ def _found_finished(run: _Run) -> Outcome:
     """There was nothing to do."""
     _remove_leftovers(run)
     found = open_archive(run.archive)
-    seconds, audit = time.perf_counter() - run.started, found.groups.get(GROUP)
-    return Outcome(run.archive, found.root, sum(counts_of(found.root).values()), True, seconds, audit=audit)
+    seconds, finished = time.perf_counter() - run.started, sum(counts_of(found.root).values())
+    beside = found.groups.get(GROUP), found.groups.get(unreduced.GROUP)
+    return Outcome(run.archive, found.root, finished, True, seconds, (), *beside)
 
 
 def _remove_leftovers(run: _Run) -> None:

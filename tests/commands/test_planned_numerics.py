@@ -14,7 +14,7 @@ from studies.commands.planned_numerics import HEADINGS, chosen, rows
 from studies.commands.preview import preview
 from studies.protocol.study import kind_of
 from studies.results.formatting import quantity
-from tests.engine.build import beam, cruise, mass, study
+from tests.engine.build import beam, cruise, mass, oscillator, study
 
 SPEEDS = {"of": "carriage.car.motion.speed", "from": 1e-3, "to": 1.0, "count": 60, "spacing": "log"}
 MASSES = {"of": "carriage.car.mass", "from": 0.01, "to": 0.1, "count": 6}
@@ -41,14 +41,19 @@ def standing(given: Study) -> list[tuple[str, ...]]:
 
 
 def test_where_the_first_carriage_stands() -> None:
-    """W L^3/(48 E I) under it in the middle; by Rayleigh pi^2/sqrt(1 + 2 m), over the supports pi^2."""
+    """W L^3/(48 E I) under it in the middle; by Rayleigh pi^2/sqrt(1 + 2 m), over the supports pi^2, and so its damping
+    ratio."""
     way = {"kind": "point-to-point", "start": 0.0, "end": 1.0, "speed": 0.1, "acceleration": 1.0}
     solver = {"steps": 2000, "audit": 0}
-    ((car, sag, frequencies),) = standing(study(beam(modes=12), mass(0.1, way), gravity=4.8, solver=solver))
+    bed = beam(modes=12, damping_ratio=0.02)
+    ((car, sag, frequencies, damping),) = standing(study(bed, mass(0.1, way), gravity=4.8, solver=solver))
     assert car == "car" and sag == f"up to {quantity(0.01, 'm')}, at {quantity(0.5, 'm')}"
     low, _, high = frequencies.removesuffix(" Hz").partition(" to ")
     assert float(low) == pytest.approx(0.5 * math.pi / math.sqrt(1.2), rel=1e-2)
     assert float(high) == pytest.approx(0.5 * math.pi, rel=1e-2)
+    assert [float(end) for end in damping.split(" to ")] == pytest.approx([0.02 / math.sqrt(1.2), 0.02], rel=1e-2)
+    swung = standing(study(bed, oscillator(0.3, 9.0, way), gravity=4.8, solver=solver))
+    assert [row[3] for row in swung] == [""]
 
 
 def test_what_moves_away_stands_nowhere() -> None:

@@ -12,10 +12,13 @@ from results_schema.errors import BadInput
 from results_schema.store.archive import Archive, open_archive
 from results_schema.validate import validate
 from results_schema.variables import expand
+from studies.commands.preview import preview
+from studies.commands.screens import show_outcome
 from studies.protocol.options import RunOptions
+from studies.protocol.study import kind_of
 from studies.reporting.report import write_report
 from studies.runs import unreduced
-from studies.runs.runner import run_to_archive
+from studies.runs.runner import UNREDUCED, run_to_archive
 from tests.engine.build import beam, cruise, fixed, mass, shuttle
 from tests.unreduced.test_unreduced import RIGID, frame, riding
 
@@ -147,3 +150,17 @@ def test_a_force_that_is_rounding_beside_others_has_no_range() -> None:
     names = {"axial": "axial_force", "shoe": "contact_force"}
     found = unreduced._gaps(Compared(names, np.zeros(3), np.zeros(3), 2.0 * whole, whole, whole, whole, 1, 1))
     assert np.isnan(found["difference"][0]) and found["difference"][1] == 3.5
+
+
+def test_a_run_and_what_is_foreseen_say_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """While it is computed, when it is done, and when it is found finished; `check` foresees its time apart."""
+    stages: list[str] = []
+    first = run_to_archive(table_study(), tmp_path / "found.nc", RunOptions(), stage=stages.append)
+    assert UNREDUCED in stages
+    again = run_to_archive(table_study(), tmp_path / "found.nc", RunOptions())
+    assert not first.was_finished and again.was_finished
+    for outcome in (first, again):
+        show_outcome(outcome)
+        assert "Against the unreduced finite-element model of " in " ".join(capsys.readouterr().out.split())
+    cost = preview(kind_of(table_study()).parts(table_study()), 1).cost
+    assert cost.endswith(" On top of that 1 variant by the unreduced model, seconds to minutes each.")
