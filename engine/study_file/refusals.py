@@ -117,6 +117,8 @@ def bad_input(detail: Any, model: type[Spec], data: Any, source: Source) -> BadI
         return BadInput("unknown key", where=where, expected=f"one of {', '.join(names)}", remedy=remedy)
     place = field_at(model, data, keys)
     expected = place.describe() if place else ""
+    if detail["type"] == "missing" and isinstance(keys[-1], int):
+        return _too_few(model, data, keys[:-1], source)
     if detail["type"] == "missing":
         return BadInput("this key is missing", where=where, expected=expected)
     try:
@@ -128,6 +130,14 @@ def bad_input(detail: Any, model: type[Spec], data: Any, source: Source) -> BadI
     remedy = place.hint if place and bound else nearest(detail["input"], [str(word) for word in words])
     remedy = remedy or _misplaced(model, data, keys)
     return BadInput(_what(detail), where=where, expected=expected or detail["msg"], received=received, remedy=remedy)
+
+
+def _too_few(model: type[Spec], data: Any, keys: Keys, source: Source) -> BadInput:
+    """A list with fewer entries than it has to have, such as two of a vector."""
+    place, where = field_at(model, data, keys), source.where(".".join(str(key) for key in keys))
+    wanted = len(get_args(place.annotation)) if place else 0
+    expected = f"{wanted} entries" if wanted else "more entries"
+    return BadInput("this list is too short", where=where, expected=expected, received=shortened(value_at(data, keys)))
 
 
 def _looked_for(model: type[Spec], data: Any, keys: Keys) -> str:

@@ -49,6 +49,10 @@ MISTAKES = {
     "gravity below a sensor": (SMALL.replace("at = 0.5", "at = 0.5\ngravity = 9.81"), 2, ["at the top of the file"]),
     "scheme below sweep": (axis(SWEEP + 'scheme = "auto"'), 2, ["scheme is a key of [solver]"]),
     "an axis as a list": (axis("mass = [1, 2]"), 2, ["sweep.mass", "{ of = "]),
+    "two of three numbers": (
+        SMALL + "[frame.beam]\nposition = [1, 2]\n",
+        2, ["frame.beam.position: this list is too short; expected 3 entries, received [1, 2]"],
+    ),
     "an axis of one unit": (
         axis('v = { of = "carriage.trolley.motion.speed", from = "2 km/h", to = 160, count = 3 }'),
         2, ["sweep.v", '"2 km/h" and 160', "160 needs its unit too"],
