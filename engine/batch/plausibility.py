@@ -145,8 +145,8 @@ def _braking(plan: Plan) -> Iterator[str]:
         remedy = "bodies on contacts never push along"
     yield (
         f"the force that brakes {tie.name}, up to {_newtons(force)}, does not push "
-        f"{plan.base.bodies[tie.body].name} along its track, so residual vibration along it is not in the answer; "
-        f"{remedy}"
+        f"{plan.base.bodies[tie.body].name} along its track, nor bend it where the track lies beside its axis, so that "
+        f"vibration by that is not in the answer; {remedy}"
     )
 
 

@@ -180,7 +180,7 @@ def _ranges(found: Sequence[Range], percentiles: Sequence[float], every: str) ->
         paragraphs(f"The same where there is one: {', '.join(some[:MOST_ALIKE])}.")
     loose = [f"{_name(one)} {one.said(one.extreme)}" for one in found if one.is_loose]
     if loose:
-        paragraphs(f"By their told errors hardly known: {', '.join(loose)}.")
+        paragraphs(f"Told errors of more than a tenth of the value: {', '.join(loose)}.")
 
 
 def _where(found: Range) -> str:

@@ -213,7 +213,7 @@ def test_no_text_is_mathematics() -> None:
 def test_histories_with_too_few_instants_for_the_vibration_say_so(times: str, coarse: bool) -> None:
     text = scenes.text_of("trajectory").replace("times = [0, 1, 3]", f"times = {times}")
     sensors, *_ = answers.figures(studies.run(engine.load(text)))
-    assert ("between two of them it does what is not drawn" in sensors.caption) == coarse
+    assert ("is not drawn as it is" in sensors.caption) == coarse
 
 
 def test_directions_of_sensors_stand_on_axes_and_in_titles() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from results_schema.arrays import Array
 from studies.findings.theory import first_omega
-from studies.results.formatting import quantity
+from studies.results.formatting import number, quantity
 from studies.results.places import Index
 from studies.results.results import Results
 
@@ -104,6 +104,7 @@ def coarse(results: Results, times: Array) -> str:
     if each >= PER_PERIOD * first:
         return ""
     return (
-        f" The histories have {quantity(each, 'Hz')} of instants and the body vibrates at {quantity(first, 'Hz')} and "
-        'more: between two of them it does what is not drawn; [output] histories = "all" keeps every step.'
+        f" {number(each)} instants a second are kept: vibration above {quantity(each / PER_PERIOD, 'Hz')} is not drawn "
+        f"as it is, and the first frequency of the body is {quantity(first, 'Hz')}; [output] histories = "
+        '"all" keeps every step.'
     )
