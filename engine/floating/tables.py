@@ -101,7 +101,7 @@ def _fill_integrals(body: ElasticBody, numbers: Array, modes: Array, pairs: Arra
     pairs[:, :, columns.MODAL_MASS] = np.einsum("ijaa->ij", both)
     pairs[:, :, columns.STIFFNESS] = np.diag(body.omega**2)
     if body.shortening is not None and body.shortened:
-        whole, moments = body.shortening.integrals()
+        whole, moments = body.shortening.integrals
         A = body.shortened
         pairs[:, :, columns.NEARING : columns.NEARING + A] = np.moveaxis(whole, 0, -1)
         turned = moments.reshape(3 * A, *moments.shape[2:])

@@ -32,7 +32,7 @@ def lacking(model: FloatingModel, name: str) -> Array:
     body = model.bodies[name]
     if body.stiffens or body.shortening is None or not body.omega.size:
         return np.zeros(3)
-    moments = body.shortening.integrals()[1].copy()
+    moments = body.shortening.integrals[1].copy()
     for other in model.bodies:
         if model.frame(other).on == name:
             at = model.frame(other).at

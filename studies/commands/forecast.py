@@ -95,7 +95,7 @@ def _converge(plan: Plan, groups: Sequence[Group], halted: Callable[[], bool]) -
 
 def _of_convergence(plan: Plan, looked: Looked, threads: int) -> Forecast:
     """A study whose variants all converge by themselves."""
-    # each has tables of its own, which take longer than its marches, and threads make hardly side by side
+    # Each has tables of its own. They take longer than its marches, and two threads hardly make them at the same time.
     chunks = sum(1 for _ in plan.chunks(None, None))
     seconds = looked.seconds * chunks + plan.seconds / min(threads, chunks)
     if not looked.parts:

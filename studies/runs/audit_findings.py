@@ -130,7 +130,9 @@ def _held_accuracy(group: xr.Dataset | None, results: Results) -> str:
     if estimates.size and tolerances.min() < tolerances.max() and results.each_within_tolerance(fine):
         said = f"{found}, each within its own tolerance ({_span(tolerances)})"
     elif estimates.size and estimates.max() > tolerances.max():
-        said = f"{said} (what a study fixes itself, as modes, steps or elements, is told and makes no status)"
+        said = (
+            f"{said} (what a study fixes itself, as modes, steps or elements, is told and does not change the status)"
+        )
     return f"{said}; {told_none_briefly(results) if group is None else _compared(group, results)}"
 
 

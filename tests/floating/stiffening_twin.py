@@ -8,6 +8,7 @@ portal, whose mass lies beside its track, turns freely. Then each term is switch
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -37,8 +38,9 @@ class Skewed(BeamShortening):
     def along(self, x: Array) -> Array:
         return np.multiply.outer(ALONG, super().along(x)[:, :, 0]).transpose(1, 2, 0, 3, 4)
 
+    @cached_property
     def integrals(self) -> tuple[Array, Array]:
-        whole, moments = super().integrals()
+        whole, moments = super().integrals
         return np.multiply.outer(ALONG, whole[0]), np.multiply.outer(ALONG, moments[0])
 
 

@@ -67,7 +67,7 @@ def test_frequencies_of_a_rotating_cantilever(eta: float, out_of_plane: tuple[fl
     body = model.bodies["arm"]
     unit = np.sqrt(7e10 * 2e-7 / 1.2) / 100.0
     assert body.shortening is not None
-    along = body.shortening.integrals()[1][0, 0]
+    along = body.shortening.integrals[1][0, 0]
     stiffness = np.diag(body.omega**2) + (eta * unit) ** 2 * along
     found = np.sqrt(np.linalg.eigvalsh(stiffness)[:3]) / unit
     assert found == pytest.approx(out_of_plane, rel=1e-3)

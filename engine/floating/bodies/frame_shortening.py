@@ -57,8 +57,8 @@ class Moved(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class FrameShortening:
-    """G of a frame whose points move by nodal (6 F, N), with its track; origin (3,) m: of the
-    floating frame, in its axes."""
+    """G of a frame whose points move by nodal (6 F, N), with its track; origin (3,) m: of the floating frame, in its
+    axes."""
 
     body: FrameBody
     assembly: Assembly
@@ -90,11 +90,8 @@ class FrameShortening:
             found[derivative] += np.einsum("ab,s,sbp->sap", frame, (sense / length) ** derivative, inner)
         return self.pairs.symmetric(found)
 
-    def integrals(self) -> tuple[Array, Array]:
-        return self._integrals
-
     @cached_property
-    def _integrals(self) -> tuple[Array, Array]:
+    def integrals(self) -> tuple[Array, Array]:
         N = self.nodal.shape[1]
         whole, moments = np.zeros((3, N, N)), np.zeros((3, 3, N, N))
         for places, dm, G in self.weighed():
@@ -105,7 +102,7 @@ class FrameShortening:
     @cached_property
     def moved(self) -> Moved:
         """G of the frame's points and elements."""
-        mesh, elements = self.assembly.mesh, self.assembly
+        mesh, assembly = self.assembly.mesh, self.assembly
         ends = mesh.turns @ self.nodal[mesh.freedoms]
         gamma, kappa = strains(mesh.beams, ends, self.pairs)
         forces, within, twist = held(mesh.beams, gamma, kappa)
@@ -117,8 +114,8 @@ class FrameShortening:
         forces = forces + stiffness(mesh.beams) @ by_arms
         loads = np.zeros_like(self.nodal, shape=(len(self.nodal), forces.shape[2]))
         np.add.at(loads, mesh.freedoms, -np.swapaxes(mesh.turns, 1, 2) @ forces)
-        solver = factorised(elements.stiffness, elements.mass, elements.rigid)
-        nodal = elements.whole(solver.solve(loads[elements.free]))
+        solver = factorised(assembly.stiffness, assembly.mass, assembly.rigid)
+        nodal = assembly.whole(solver.solve(loads[assembly.free]))
         return Moved(nodal, np.einsum("eba,ekbp->ekap", mesh.axes, within), twist)
 
     def _ends(self, points: TrackPoints) -> Array:

@@ -4,6 +4,7 @@ beginning, and what pulls at them stiffens the body (or softens it, where it pus
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -25,6 +26,7 @@ class Shortening(Protocol):
         """(3, S, A, N, N): G and its first two derivatives at ascending places (S,) m of the track."""
         ...
 
+    @property
     def integrals(self) -> tuple[Array, Array]:
         """(A, N, N) and (A, 3, N, N): of G dm and of G c^T dm, c the places of the undeformed body."""
         ...
@@ -45,6 +47,7 @@ class BeamShortening:
         found = np.stack([self._up_to(x), _products(one), change + np.swapaxes(change, 1, 2)])
         return found[:, :, None]
 
+    @cached_property
     def integrals(self) -> tuple[Array, Array]:
         order = np.argsort(self.places)
         x, dm = self.places[order], self.masses[order]

@@ -122,7 +122,7 @@ def test_displacements_of_second_order_are_those_of_exact_kinematics() -> None:
             parts.append((here.places[at] + arm, 0.25 * masses, G))
     places, masses, G = (np.concatenate(part) for part in zip(*parts, strict=True))
     c, G = places @ frame.T - own.origin, G @ frame.T
-    whole, moments = (np.einsum("...ij,i,j->...", part, q, q) for part in own.integrals())
+    whole, moments = (np.einsum("...ij,i,j->...", part, q, q) for part in own.integrals)
     assert whole == pytest.approx(masses @ G, abs=1e-5 * np.abs(masses @ G).max())
     wanted = np.einsum("g,ga,gb->ab", masses, G, c)
     assert moments == pytest.approx(wanted, abs=1e-5 * np.abs(wanted).max())
