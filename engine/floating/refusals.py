@@ -84,6 +84,9 @@ def _check_sensor(study: Study, name: str, sensor: Sensor) -> None:
         raise fault(here, "this place is not read in frames that move", expected="at, or under")
     if sensor.frequency_limit is not None:
         raise fault(f"{here}.frequency_limit", "sensors in frames that move read all modes", expected="no such key")
+    if sensor.is_dynamic_part:
+        what = "in frames that move the whole is read, not its dynamic part"
+        raise fault(f"{here}.part", what, expected="no such key")
     if sensor.reads.of_drive:
         _check_drive(study, name, sensor)
     if sensor.under is not None and sensor.quantity != "displacement":

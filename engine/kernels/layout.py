@@ -57,7 +57,8 @@ class Lanes(NamedTuple):
     for a coordinate that is the place of a mass m;
     coupling_mass (blocks, ties, LANES): m (kg), or c h for a damper;
     coupling_stiffness (blocks, ties, LANES): k h^2 of a spring;
-    load (blocks, ties, LANES): the tie's dead load times h^2;  gravity, step (blocks, LANES): m/s^2, and h in s.
+    load (blocks, ties, LANES): the tie's dead load times h^2;  weight (blocks, carriages, LANES): N;
+    gravity, step (blocks, LANES): m/s^2, and h in s.
     """
 
     stiffness: FloatArray
@@ -66,6 +67,7 @@ class Lanes(NamedTuple):
     coupling_mass: FloatArray
     coupling_stiffness: FloatArray
     load: FloatArray
+    weight: FloatArray
     gravity: FloatArray
     step: FloatArray
 
@@ -92,6 +94,8 @@ class Observation(NamedTuple):
     order (channels): the power of 1/h that makes it SI;  static (stations, signals, ties): deflection per unit
     force that the kept modes miss;  offset (stations, signals): per unit gravity, in step units of offset_order
     (signals), the power of 1/h that makes it SI;
+    at_rest (stations, signals, carriages): what a dynamic part leaves out, per unit weight of each carriage;
+    (0, 0, 0) where no signal is one.
     counted (stations, signals): whether the station enters extremes.
     summed (signals): whether squares are summed over time, which wants a signal that counts all along the segment.
     """
@@ -104,6 +108,7 @@ class Observation(NamedTuple):
     static: FloatArray
     offset: FloatArray
     offset_order: IntArray
+    at_rest: FloatArray
     counted: BoolArray
     summed: BoolArray
 

@@ -22,7 +22,7 @@ from engine.observation import kinks, signals
 from engine.observation.contact_forces import contacts_that_react
 from engine.observation.readings import Sensor
 from engine.observation.signals import Signal, build_sensors, last_signals, tabulate_missed, tabulate_watch
-from engine.statics.static_response import Statics
+from engine.statics.static_response import Statics, left_out
 from results_schema.arrays import Array, Counts
 
 SegmentKey = tuple[float, float, int, tuple[bool, ...]]
@@ -148,7 +148,8 @@ class SceneTables:
                 missed.extend(found)
         else:
             found = missed[0], missed[1]
-        watch = tabulate_watch(self.model, self.signals, along, found[1])
+        at_rest = left_out(self.model, self.signals, along)
+        watch = tabulate_watch(self.model, self.signals, along, found[1], at_rest)
         contacts = len(self.signals) - len(self.sensors)
         unrecorded, others = (
             (last_signals(watch, contacts), self.signals[-contacts:]) if contacts else (watch, self.signals)

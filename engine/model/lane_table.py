@@ -63,7 +63,8 @@ class LaneTable:
     omega (N,);  rates (blocks, N, LANES): 2 zeta omega;  inverse_modal_mass (blocks, N, LANES): 1, and 1/m (1/kg) of
     sprung masses;  mass, weight (blocks, ties, LANES): of the carriages, zero for dampers and springs, mass only what
     touches the body and has inertia;  joint (blocks, ties, LANES): 1 for rigid joints;  damper, spring (blocks, ties,
-    LANES): N s/m and N/m, zero for carriages;  time_scale, gravity (blocks, LANES).
+    LANES): N s/m and N/m, zero for carriages;  of_carriages (blocks, carriages, LANES): N, their weights alone;
+    time_scale, gravity (blocks, LANES).
     """
 
     omega: Array
@@ -74,6 +75,7 @@ class LaneTable:
     weight: Array
     damper: Array
     spring: Array
+    of_carriages: Array
     time_scale: Array
     gravity: Array
 
@@ -88,6 +90,7 @@ class LaneTable:
             coupling_mass=(self.mass + self.joint).take(own, 1) + self.damper.take(own, 1) * h,
             coupling_stiffness=self.spring.take(own, 1) * h**2,
             load=self.weight.take(own, 1) * h**2,
+            weight=self.of_carriages,
             gravity=self.gravity,
             step=step,
         )
@@ -97,7 +100,7 @@ def lane_table(model: SceneModel, values: VariantValues) -> LaneTable:
     """The lanes of some variants, whose number must be a multiple of LANES."""
     rates = [values.damping_rates(part.name, part.modal.omega) for part in model.bodies]
     none, numbers = np.zeros(values.size), range(len(model.carriages))
-    masses = [_contact_mass(model, values, number) for number in numbers]
+    masses, heavy = [_contact_mass(model, values, number) for number in numbers], weights(model, values)
     carriages, dampers, springs = ([none] * len(part) for part in (model.carriages, model.dampers, model.springs))
     rigid = [np.full(values.size, float(spring.rigid)) for spring in model.springs]
     coefficients = [values.column(damper.key) for damper in model.dampers]
@@ -116,9 +119,10 @@ def lane_table(model: SceneModel, values: VariantValues) -> LaneTable:
         ),
         mass=to_blocks(np.stack(masses + dampers + springs + alongside)),
         joint=to_blocks(np.stack(carriages + dampers + rigid + pushes)),
-        weight=to_blocks(np.stack([*weights(model, values), *dampers, *springs, *pushes])),
+        weight=to_blocks(np.stack([*heavy, *dampers, *springs, *pushes])),
         damper=to_blocks(np.stack(carriages + coefficients + pushes)),
         spring=to_blocks(np.stack(carriages + dampers + stiffness + pushes)),
+        of_carriages=to_blocks(heavy),
         time_scale=to_blocks(values.scene_time_scale),
         gravity=to_blocks(values.gravity),
     )

@@ -57,6 +57,11 @@ class Sensor:
         return self
 
     @property
+    def reads_whole(self) -> Sensor:
+        """What reads the whole of what this one may read a part of: itself."""
+        return self
+
+    @property
     def reads(self) -> Quantity:
         """What it reads, as the table of quantities has it."""
         return QUANTITIES[self.quantity]

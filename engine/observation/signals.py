@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from engine.kernels.layout import Observation
 from engine.observation.contact_forces import ContactForce, ContactSensor
+from engine.observation.dynamic_part import DynamicPart
 from engine.observation.readings import Sensor, SpotSensor, SprungSensor
 from results_schema.arrays import Array, Counts
 
@@ -20,11 +21,13 @@ if TYPE_CHECKING:
 
 Signal = Sensor | ContactForce
 
+NOTHING = np.zeros((0, 0, 0))  # of what dynamic parts leave out
+
 
 def build_sensors(model: SceneModel, accelerated: tuple[CarriageTie, ...] = ()) -> tuple[Sensor, ...]:
     """The sensors in the study's order, then the acceleration across of some carriages."""
     names = [carriage.name for carriage in model.carriages]
-    sensors = [_sensor(model, name, names) for name in model.study.sensor]
+    sensors = [_part(model, name, _sensor(model, name, names)) for name in model.study.sensor]
     for carriage in accelerated:
         name, under = f"{carriage.name}_acceleration_across", names.index(carriage.name)
         if carriage.rides is None:
@@ -32,6 +35,11 @@ def build_sensors(model: SceneModel, accelerated: tuple[CarriageTie, ...] = ()) 
         else:
             sensors.append(Sensor(name, "acceleration", carriage.rides, carriage.reference, None))
     return tuple(sensors)
+
+
+def _part(model: SceneModel, name: str, whole: Sensor) -> Sensor:
+    """What a sensor of the study reads of what there is."""
+    return DynamicPart.of(whole) if model.study.sensor[name].is_dynamic_part else whole
 
 
 def _sensor(model: SceneModel, name: str, carriages: list[str]) -> Sensor:
@@ -60,14 +68,21 @@ def tabulate_missed(model: SceneModel, signals: tuple[Signal, ...], along: Along
 
 
 def tabulate_watch(
-    model: SceneModel, signals: tuple[Signal, ...], along: Along, missed: Array | None = None
+    model: SceneModel,
+    signals: tuple[Signal, ...],
+    along: Along,
+    missed: Array | None = None,
+    at_rest: Array = NOTHING,
 ) -> Observation:
-    """Rows of every signal along a segment. missed: of `tabulate_missed`, where it is known; else of all ties."""
+    """Rows of every signal along a segment. missed: of `tabulate_missed`, where it is known; else of all ties. at_rest
+    (stations, signals, C + 1): what dynamic parts leave out, per unit weight of each carriage, and last per unit
+    gravity; (0, 0, 0) where no signal is one."""
     channels = [(number, channel) for number, signal in enumerate(signals) for channel in signal.channels(model, along)]
     ordered = [(number, channel) for of in "qva" for number, channel in channels if channel.of == of]
     rows = {of: [channel.rows for _, channel in ordered if channel.of == of] for of in "qva"}
     modes = 4 * -(-model.omega.size // 4)
     counted = np.ascontiguousarray(np.stack([s.counted(model, along) for s in signals], axis=1))
+    offset = np.stack([s.offset(model, along) for s in signals], axis=1)
     return Observation(
         on_q=_stacked(rows["q"], modes),
         on_v=_stacked(rows["v"], modes),
@@ -75,8 +90,9 @@ def tabulate_watch(
         signal=np.array([number for number, _ in ordered], dtype=np.int64),
         order=np.array([channel.order for _, channel in ordered], dtype=np.int64),
         static=tabulate_missed(model, signals, along, np.arange(model.ties)) if missed is None else missed,
-        offset=np.ascontiguousarray(np.stack([s.offset(model, along) for s in signals], axis=1)),
+        offset=np.ascontiguousarray(offset - at_rest[:, :, -1] if at_rest.size else offset),
         offset_order=np.array([s.offset_order for s in signals], dtype=np.int64),
+        at_rest=np.ascontiguousarray(at_rest[:, :, :-1]),
         counted=counted,
         summed=_summed(signals, counted),
     )
@@ -97,6 +113,7 @@ def along_part(watch: Observation, signals: tuple[Signal, ...], part: slice, tie
         on_a=on_a,
         static=watch.static[part].take(ties, 2),
         offset=watch.offset[part],
+        at_rest=watch.at_rest[part],
         counted=counted,
         summed=_summed(signals, counted),
     )
@@ -114,6 +131,7 @@ def last_signals(watch: Observation, count: int) -> Observation:
         static=np.ascontiguousarray(watch.static[:, part]),
         offset=np.ascontiguousarray(watch.offset[:, part]),
         offset_order=watch.offset_order[part],
+        at_rest=NOTHING,
         counted=np.ascontiguousarray(watch.counted[:, part]),
         summed=watch.summed[part],
     )

@@ -60,6 +60,15 @@ def _check_band(sensor: Sensor) -> None:
         raise fault("a settling_band is one of displacements", expected='quantity = "displacement"')
 
 
+def _check_part(sensor: Sensor) -> None:
+    if sensor.part != "whole" and (sensor.reads.rate or sensor.reads.of_arm or sensor.reads.of_drive):
+        known = ", ".join(
+            name for name, quantity in QUANTITIES.items() if not (quantity.rate or quantity.of_arm or quantity.of_drive)
+        )
+        expected, remedy = f"quantity: one of {known}", "leave part out"
+        raise fault(f"statics have no {sensor.quantity}, all of it is dynamic", expected=expected, remedy=remedy)
+
+
 def _check_moment(sensor: Sensor) -> None:
     if sensor.reads.turns and (sensor.node is None or sensor.direction is None):
         remedy = 'of a uniform beam quantity = "bending_moment" at its clamped end'
@@ -98,6 +107,7 @@ class Sensor(Spec):
     forces where nothing is given. frequency_limit: up to it modes count in a velocity or an acceleration, which
     converges then and is held.
     settling_band: within which of its static value a displacement has settled after a stop.
+    part: "dynamic" for what it reads less what it would read if all carriages stood still where they are.
     """
 
     body: str | None = None
@@ -114,6 +124,7 @@ class Sensor(Spec):
     tolerance: OwnTolerance | None = None
     frequency_limit: Limit | None = None
     settling_band: Band | None = None
+    part: Annotated[str, AfterValidator(one_of("whole", "dynamic"))] = "whole"
 
     @model_validator(mode="before")
     @classmethod
@@ -138,6 +149,7 @@ class Sensor(Spec):
         _check_band(self)
         _check_error(self)
         _check_drive(self)
+        _check_part(self)
         if self.direction is not None and not self.reads.of_arm and self.node is None and self.member is None:
             of_arm = 'without direction; where frames move quantity = "position_error" has one'
             remedy = "a node with direction where the carriage stops" if self.under is not None else of_arm
@@ -158,6 +170,17 @@ class Sensor(Spec):
         if self.contact is not None and not self.reads.of_contact:
             raise fault("only contact forces are read at a contact", expected='quantity = "contact_force"')
         return self
+
+    @property
+    def is_dynamic_part(self) -> bool:
+        """Whether it reads how far its quantity is from statics at the same places of the carriages."""
+        return self.part == "dynamic"
+
+    @property
+    def words(self) -> str:
+        """What it reads, in words."""
+        said = self.quantity.replace("_", " ")
+        return f"dynamic part of the {said}" if self.is_dynamic_part else said
 
     @property
     def takes_limit(self) -> bool:
@@ -231,6 +254,11 @@ class Envelope(Spec):
     def fixed_place(self) -> None:
         """None: it reads many."""
         return None
+
+    @property
+    def words(self) -> str:
+        """What it reads, in words."""
+        return self.quantity.replace("_", " ")
 
     @model_validator(mode="after")
     def _ascending(self) -> Envelope:

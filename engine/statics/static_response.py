@@ -20,6 +20,7 @@ from results_schema.arrays import Array, Counts
 if TYPE_CHECKING:
     from engine.model.scene_model import SceneModel
     from engine.model.timeline import Timeline
+    from engine.observation.signals import Signal
     from engine.scene.variants import VariantValues
 
 
@@ -49,6 +50,17 @@ def static_readings(model: SceneModel, sensors: Sequence[Sensor], along: Along) 
         found[:, j, -1] += sensor.sagging(model, along)
         if sensor.under is not None and (here := along[sensor.under].here) is not None:
             found[~here, j] = 0.0
+    return found
+
+
+def left_out(model: SceneModel, signals: Sequence[Signal], along: Along) -> Array:
+    """(S, J, C + 1) the static readings that signals leave out of the whole; (0, 0, 0) where none does."""
+    readers = [signal.as_sensor(model) for signal in signals]
+    parts = [j for j, reader in enumerate(readers) if reader.reads_whole is not reader]
+    if not parts:
+        return np.zeros((0, 0, 0))
+    found = np.zeros((along[0].s.size, len(signals), len(model.carriages) + 1))
+    found[:, parts] = static_readings(model, [readers[j].reads_whole for j in parts], along)
     return found
 
 
@@ -124,16 +136,19 @@ class Statics:
 
     @cached_property
     def over_window(self) -> StaticUnit:
-        """Readings at `counts`."""
-        return self.at(self.counts)
+        """Readings at `counts`, whole ones of sensors that read a part."""
+        return self._at(self.counts, tuple(sensor.reads_whole for sensor in self.sensors))
 
     def at(self, counts: Array | Counts) -> StaticUnit:
         """Readings at stations by their count."""
         key = counts.tobytes()
         if key not in self._kept:
-            readings = static_readings(self.model, self.sensors, standing(self.timeline, counts))
-            self._kept[key] = StaticUnit(readings[:, :, :-1], readings[:, :, -1])
+            self._kept[key] = self._at(counts, self.sensors)
         return self._kept[key]
+
+    def _at(self, counts: Array | Counts, sensors: tuple[Sensor, ...]) -> StaticUnit:
+        readings = static_readings(self.model, sensors, standing(self.timeline, counts))
+        return StaticUnit(readings[:, :, :-1], readings[:, :, -1])
 
     def slope_at(self, counts: Array | Counts) -> Array:
         """(H, J) derivative of the readings per unit force of the first carriage by its position; 0 where it is not."""

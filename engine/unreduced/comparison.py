@@ -77,14 +77,15 @@ def compare_variant(plan: Plan, variant: int, spent: Flat, check: Callable[[], N
     seen = np.isfinite(found.sensors)
     places = np.stack([tables.timeline.positions(r, counts) for r in range(len(whole.riders))], axis=1)
     resting = statics_at(whole, Along.at_rest(places, np.isfinite(places), whole.riders)).sensors
+    left_out = np.where([sensor.is_dynamic_part for sensor in study.sensor.values()], resting, 0.0)
     return Compared(
         quantities={name: sensor.quantity for name, sensor in study.sensor.items()},
         elapsed=course.elapsed(by * counts),
         position=tables.timeline.positions(0, counts),
         marched=marched.history[:, :, 0].T,
         marched_static=np.where(np.isfinite(marched.history[:, :, 0]), _static(tables, values, counts), np.nan).T,
-        unreduced=found.sensors.T,
-        unreduced_static=np.where(seen, resting, np.nan).T,
+        unreduced=(found.sensors - left_out).T,
+        unreduced_static=np.where(seen, resting - left_out, np.nan).T,
         degrees_of_freedom=whole.size,
         steps=course.timeline.steps,
     )

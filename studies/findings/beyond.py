@@ -7,6 +7,7 @@ from typing import Annotated, cast
 import numpy as np
 from pydantic import Field
 
+from engine.scene.sensors import Sensor
 from engine.scene.study import Study
 from engine.study_file.spec import Spec
 from engine.study_file.units import Acceleration, Dimensionless, Length, Pressure, Speed, Torque
@@ -42,14 +43,22 @@ class Limits(Spec):
         """What is named for a quantity."""
         return getattr(self, name, None) if name in LIMITED else None
 
+    def of(self, sensor: Sensor) -> float | None:
+        """What is named for what a sensor reads: of wholes."""
+        return None if sensor.is_dynamic_part else self.limit(sensor.quantity)
+
 
 class AskedOfPassages(Limits):
     """The table [question] of a passage. amplification: dynamic over static, of which is told at which speeds it is
     exceeded; the limits: of absolute values, of which the same is told for every sensor of that quantity; residual: of
-    residual vibrations."""
+    residual vibrations; dynamic_part: of sensors that read no more than that."""
 
     amplification: Annotated[Dimensionless, Field(gt=0)] = 1.1
     residual: Limits = Limits()
+    dynamic_part: Limits = Limits()
+
+    def of(self, sensor: Sensor) -> float | None:
+        return self.dynamic_part.limit(sensor.quantity) if sensor.is_dynamic_part else super().of(sensor)
 
 
 def limits_of(study: Study) -> Limits:
@@ -96,10 +105,10 @@ def in_turns(results: Results, limits: Limits, size: Mapping[str, float], told: 
     """
     alike: dict[tuple[str, bool], list[str]] = {}
     for name, sensor in results.study.sensor.items():
-        alike.setdefault((sensor.quantity, sensor.carriage is None), []).append(name)
+        alike.setdefault((sensor.words, sensor.carriage is None), []).append(name)
     order: dict[str, tuple[bool, bool, int, float, int]] = {}
     for place, ((read, of_body), names) in enumerate(alike.items()):
-        limit, first = limits.limit(read), int(of_body and read in told)
+        limit, first = limits.of(results.study.sensor[names[0]]), int(of_body and read in told)
         for turn, name in enumerate(sorted(names, key=lambda name: -size[name]), first):
             free, part = limit is None, 0.0 if limit is None else size[name] / limit
             order[name] = (turn > 0, free, turn if free else 0, -part, place)

@@ -37,7 +37,7 @@ def findings_of_cells(results: Results) -> list[str]:
 def _limits(results: Results) -> dict[str, float]:
     """The limits that the question names, by sensor."""
     named = limits_of(results.study)
-    limits = {name: named.limit(sensor.quantity) for name, sensor in results.study.sensor.items()}
+    limits = {name: named.of(sensor) for name, sensor in results.study.sensor.items()}
     return {name: limit for name, limit in limits.items() if limit is not None}
 
 

@@ -86,7 +86,7 @@ def _residual(results: Results, sensor: str, limits: Limits) -> str:
         f"{sensor}: at rest it still swings by up to {quantity(size, units)}"
         f"{told_error(error, size, units)}{in_words(results, place)}"
     )
-    limit, settled = limits.limit(results.study.sensor[sensor].quantity), _settled(results, sensor)
+    limit, settled = limits.of(results.study.sensor[sensor]), _settled(results, sensor)
     between = _told_between(results, values, place)
     if limit is None:
         return f"{said}{settled}.{between}"

@@ -73,6 +73,9 @@ class Influence(AtRestKind):
         first_carriage(study)
         check_sensors(study)
         for name, sensor in study.sensor.items():
+            if sensor.is_dynamic_part:
+                what, expected = "at rest nothing has a dynamic part", "no such key"
+                raise study.source.fault(f"sensor.{name}.part", what, expected=expected)
             if QUANTITIES[sensor.quantity].rate:
                 what = "this quantity has no static reading"
                 expected = "displacement, a section force, stress, contact_force or what supports carry"

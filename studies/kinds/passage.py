@@ -41,6 +41,8 @@ from studies.results.results import Results
 
 MOST_SENSORS = 6
 MOST_GROUPS = 5
+#: A table whose tool is 15 um off its static way is told an amplification of 1.01.
+OF_LARGEST = 'It compares largest values; a sensor with part = "dynamic" reads how far it is from statics on the way.'
 BEYOND = "The equations assume contact: beyond, they say no more."
 
 declare("passage", *MARCH, DYNAMIC_AMPLIFICATION)
@@ -152,17 +154,21 @@ def _effects(results: Results, envelopes: list[str], sensors: list[str]) -> str:
 
 def _amplified(results: Results, sensor: str) -> str:
     """Where statics are exceeded by as much as the question names; "" without anything to compare."""
-    gain = results.numbers("dynamic_amplification", sensor)
-    if results.size < 2 or not np.isfinite(np.where(results.with_values, gain, np.nan)).any():
+    gain, study = results.numbers("dynamic_amplification", sensor), results.study
+    known = np.isfinite(np.where(results.with_values, gain, np.nan)).any()
+    if study.sensor[sensor].is_dynamic_part or results.size < 2 or not known:
         return ""
     threshold = question_of(results.study, AskedOfPassages).amplification
     where = where_beyond(results, gain, threshold, results.axis(*PACES))
-    return f" The dynamic amplification exceeds {number(threshold)} {where}."
+    said = f" The dynamic amplification exceeds {number(threshold)} {where}."
+    parts = any(one.is_dynamic_part for one in study.sensor.values())
+    return said if parts or not where.startswith("nowhere") else f"{said} {OF_LARGEST}"
 
 
 def _amplified_besides(results: Results, told: str) -> str:
     """Which sensors besides that one exceed statics by as much as the question names, the most first."""
-    gains = {name: results.counting("dynamic_amplification", name) for name in results.sensors if name != told}
+    wholes = [name for name in results.sensors if name != told and not results.study.sensor[name].is_dynamic_part]
+    gains = {name: results.counting("dynamic_amplification", name) for name in wholes}
     most = {name: float(np.nanmax(gain)) for name, gain in gains.items() if np.isfinite(gain).any()}
     threshold = question_of(results.study, AskedOfPassages).amplification
     beyond = sorted((name for name, gain in most.items() if gain > threshold), key=lambda name: -most[name])
@@ -176,7 +182,7 @@ def _amplified_besides(results: Results, told: str) -> str:
 
 def _limited(results: Results, sensor: str) -> str:
     """Where a sensor is beyond what the question names for its quantity; "" where that names nothing."""
-    limit = question_of(results.study, AskedOfPassages).limit(results.study.sensor[sensor].quantity)
+    limit = question_of(results.study, AskedOfPassages).of(results.study.sensor[sensor])
     if limit is None:
         return ""
     error = errors_of_size(results, sensor)

@@ -88,6 +88,7 @@ class WorkPrecision(PiecedKind):
         asked = question_of(study, Question)
         first_carriage(study)
         check_sensors(study)
+        checks.check_wholes(study)
         checks.check_slugs(study, asked)
         checks.check_ladder(study, asked)
         checks.check_solver(study)

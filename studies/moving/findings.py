@@ -79,7 +79,7 @@ def _sensors(results: Results) -> Iterator[str]:
             yield f"{sensor}: no variant has values."
             continue
         largest = np.maximum(np.abs(low), np.abs(high))
-        limit, beyond = limits.limit(results.study.sensor[sensor].quantity), ""
+        limit, beyond = limits.of(results.study.sensor[sensor]), ""
         if limit is not None:
             axis = next(iter(by_effect(results, largest)), None)
             error = errors_of_size(results, sensor)

@@ -61,7 +61,7 @@ def _over_sweep(results: Results) -> Iterator[Figure]:
         assert top is not None
         seen = view(results, at=top)
         if seen.x is not None and not all(unchanged(results, sizes(results, name)) for name in own):
-            limit = limits.limit(results.study.sensor[own[0]].quantity)
+            limit = limits.of(results.study.sensor[own[0]])
             yield _of_tips(seen, tips, top) if tips else sizes_of(seen, own, limit, top)
 
 

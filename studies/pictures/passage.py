@@ -52,15 +52,16 @@ def pictures(results: Results) -> list[Figure]:
     top = _top(results, sensors[0])
     seen, first, others, level = _view(results, top), list[Figure](), list[Figure](), list[str]()
     if seen.x is not None:
-        for name in dict.fromkeys(results.study.sensor[sensor].quantity for sensor in sensors):
-            own = [sensor for sensor in sensors if results.study.sensor[sensor].quantity == name]
+        for name in dict.fromkeys(results.study.sensor[sensor].words for sensor in sensors):
+            own = [sensor for sensor in sensors if results.study.sensor[sensor].words == name]
+            limit = limits.of(results.study.sensor[own[0]])
             if all(unchanged(results, sizes(results, sensor)) for sensor in own):
                 continue  # the findings say so
-            if said := told_flat(_view(results, _top(results, own[0])), own, limits.limit(name)):
+            if said := told_flat(_view(results, _top(results, own[0])), own, limit):
                 level.append(said)
                 continue
-            asked = not first or limits.limit(name) is not None
-            (first if asked else others).append(_sizes(results, own, limits.limit(name)))
+            asked = not first or limit is not None
+            (first if asked else others).append(_sizes(results, own, limit))
         if seen.y is not None and len(seen.y.values) > MANY and _is_telling(seen, gain(results, sensors[0])):
             first.append(_map(seen, sensors[0]))
         touching = [name for name in results.study.carriage if _has_contact(seen, name)]

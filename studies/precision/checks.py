@@ -50,6 +50,14 @@ def check_ladder(study: Study, asked: Question) -> None:
         )
 
 
+def check_wholes(study: Study) -> None:
+    """No dynamic parts, which the references do not know. Raises BadInput."""
+    for name, sensor in study.sensor.items():
+        if sensor.is_dynamic_part:
+            what = "a study of work and precision reads the whole"
+            raise study.source.fault(f"sensor.{name}.part", what, expected="no such key")
+
+
 def check_solver(study: Study) -> None:
     """Nothing in [solver] that the study varies itself, other than what stands there by default. Raises BadInput."""
     from engine.scene.settings import Solver

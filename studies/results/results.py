@@ -169,7 +169,7 @@ class Results:
         """The quantity of what has its table ``here``, and of which modes where it says so."""
         swept = any(f"{here}.frequency_limit" in axis.paths for axis in self.axes)
         counted = f"of modes up to {number(own.frequency_limit)} Hz" if own.frequency_limit and not swept else ""
-        return own.quantity.replace("_", " "), counted
+        return own.words, counted
 
     def place(self, sensor: str) -> str:
         """Where a sensor reads, and in which direction where it names one, in words."""

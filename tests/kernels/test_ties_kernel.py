@@ -159,6 +159,7 @@ def lanes_of(one: System) -> Lanes:
         coupling_mass=one.mass + one.damper * h + one.are("rigid")[:, None],
         coupling_stiffness=one.spring * h**2,
         load=one.load * h**2,
+        weight=np.zeros((len(one.h), 0, LANES)),
         gravity=one.gravity,
         step=one.h,
     )
@@ -177,6 +178,7 @@ def marched(one: System, scheme: Newmark) -> tuple[Array, Array]:
         static=np.tile(np.eye(signals, ties, -modes), (STATIONS, 1, 1)),
         offset=np.zeros((STATIONS, signals)),
         offset_order=np.zeros(signals, dtype=np.int64),
+        at_rest=np.zeros((0, 0, 0)),
         counted=np.ones((STATIONS, signals), dtype=np.bool_),
         summed=np.ones(signals, dtype=np.bool_),
     )

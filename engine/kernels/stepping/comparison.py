@@ -137,7 +137,7 @@ def store_modes(now, b, carried, block):
 @kernel
 def note(statistics, scratch, watch, record, block, n, count):
     """Observe and keep station n; a function of its own, so that it is compiled once and not for every rule."""
-    observe(statistics, scratch.now, scratch.b, watch, n, KEPT)
+    observe(statistics, scratch.now, scratch.b, scratch.weight, watch, n, KEPT)
     keep(statistics, record.history[block], watch, record.sample[n], n, float(count + n))
 
 
@@ -154,8 +154,8 @@ def march_by_rule(rule, track, lanes, carried, watch, record, count):
     sums = np.zeros((SUMS, LANES))
     b = np.zeros((TIE + 1, LANES))
     statistics = np.zeros((watch.offset.shape[1], STATISTICS, LANES))
-    scratch = Scratch(now, work, sums, b)
     for block in range(lanes.step.shape[0]):
+        scratch = Scratch(now, work, sums, b, lanes.weight[block])
         load_modes(now, b, lanes, carried, block)
         open_statistics(statistics, record.statistics[block])
         for n in range(track.rows.shape[1]):

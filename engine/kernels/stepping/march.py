@@ -186,7 +186,7 @@ def march_one(ties, lanes, state, watch, record, scheme, count):
             put_lanes(b, (SUM,), motion - moved)
             put_lanes(b, (FACTOR,), factor)
             put_leads(b, leads, first, second)
-            observe(statistics, now, b, watch, n, leads)
+            observe(statistics, now, b, lanes.weight[block], watch, n, leads)
             keep(statistics, history, watch, record.sample[n], n, float(count + n))
         close_statistics(record.statistics[block], statistics, watch, lanes.step[block], stations - 1)
         judge_lanes(status, statistics, state.q, state.v, block)
@@ -248,7 +248,7 @@ def march_many(ties, lanes, state, watch, record, scheme, count):
                 elif leads < 0:
                     put_modes(now, k, q, v, a)
             put_leads(b, leads, first, second)
-            observe(statistics, now, b, watch, n, leads)
+            observe(statistics, now, b, lanes.weight[block], watch, n, leads)
             keep(statistics, history, watch, record.sample[n], n, float(count + n))
         close_statistics(record.statistics[block], statistics, watch, lanes.step[block], stations - 1)
         judge_lanes(status, statistics, state.q, state.v, block)

@@ -73,8 +73,9 @@ def add_modes(statistics, i, now, b, row, field, order):
 
 
 @piece
-def observe(statistics, now, b, watch, n, leads):
-    """Signals of station n in SI units: offset g + sums over the modes + static correction times contact force.
+def observe(statistics, now, b, weight, watch, n, leads):
+    """Signals of station n in SI units: offset g + sums over the modes + static correction times contact force, less
+    what carriages of so much weight (carriages, LANES) make dynamic parts leave out.
 
     leads: how many sums stand in b[LEAD] and after it already, all of them, or KEPT.
     """
@@ -86,6 +87,8 @@ def observe(statistics, now, b, watch, n, leads):
             missed = watch.static[n, i, r]
             if missed != 0.0:
                 value = value + missed * (lanes_at(b, (TIE + r,)) * lanes_at(b, (RATE_2,)))
+        for c in range(watch.at_rest.shape[2]):
+            value = value - watch.at_rest[n, i, c] * lanes_at(weight, (c,))
         put_lanes(statistics, (i, VALUE), value)
     of_q, of_v, of_a = watch.on_q.shape[1], watch.on_v.shape[1], watch.on_a.shape[1]
     for c in range(leads):

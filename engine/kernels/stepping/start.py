@@ -170,7 +170,7 @@ def watch_start(ties, lanes, state, watch, record, count):
             forces_at_start(force, matrix, unknown, ties, lanes, state, (block, j))
             for r in range(many):
                 b[TIE + r, j] = force[r]
-        observe(statistics, now, b, watch, 0, KEPT)
+        observe(statistics, now, b, lanes.weight[block], watch, 0, KEPT)
         keep(statistics, record.history[block], watch, record.sample[0], 0, float(count))
         for i in range(statistics.shape[0]):
             for j in range(LANES):

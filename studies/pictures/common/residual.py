@@ -69,7 +69,7 @@ def _residuals(results: Results, sensors: list[str], limits: Limits, fewer: int)
     rows = []
     for sensor in sensors:
         errors, label = absolute_errors(results, f"{sensor}_residual"), partial(results.label, sensor, of="residual")
-        limit = limits.limit(results.study.sensor[sensor].quantity)
+        limit = limits.of(results.study.sensor[sensor])
         rows.append(Row(sensor, residual_of(results, sensor), errors, results.sensors[sensor], label, limit))
     size, units, limit = float(np.nanmax(rows[0].values)), rows[0].units, rows[0].limit
     against = ""

@@ -73,7 +73,7 @@ def _reached(results: Results, sensor: str, index: Index) -> tuple[float, float]
 def _draw(results: Results, sensors: list[str], limits: Limits, shown: list[Index], drawing: Drawing) -> None:
     rows = drawing.subplots(len(sensors), 1, squeeze=False, sharex=True)[:, 0]
     for axes, sensor in zip(rows, sensors, strict=True):
-        _draw_row(axes, results, sensor, limits.limit(results.study.sensor[sensor].quantity), shown)
+        _draw_row(axes, results, sensor, limits.of(results.study.sensor[sensor]), shown)
     if len(shown) > 1:
         legend_of_all(drawing, rows[0])
     rows[-1].set_xlabel(f"way of {results.carriage_name} (m)")
@@ -97,7 +97,7 @@ def _draw_row(axes: Axes, results: Results, sensor: str, limit: float | None, sh
         said = f"limit {quantity(limit, results.sensors[sensor])}"
         sides = [side for side in (-limit, limit) if side * (low if side < 0.0 else high) >= REACHED * limit**2]
         for side in sides:
-            limit_line(axes, side * scale.factor, said, "right")
+            limit_line(axes, side * scale.factor, said if side == sides[-1] else "", "right")
         if not sides:
             limit_far(axes, f"{said}, beyond this panel")
 

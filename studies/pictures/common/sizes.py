@@ -120,7 +120,9 @@ def _told_gain(seen: View, sensor: str) -> str:
     known = known[np.isfinite(known)]
     if not known.size or np.ptp(known) > HARDLY:
         return ""
-    return f"Dynamic amplification of {sensor.replace('_', ' ')}: {number(float(known.max()))} throughout."
+    part = seen.results.study.sensor[sensor].is_dynamic_part
+    said = "Dynamic part over the largest static value" if part else "Dynamic amplification"
+    return f"{said} of {sensor.replace('_', ' ')}: {number(float(known.max()))} throughout."
 
 
 def _told_flat(seen: View, sensor: str) -> str:
@@ -179,7 +181,9 @@ def _draw(seen: View, sensors: list[str], limit: float | None, columns: int, dra
             continue
         if _has_gain(seen, sensor):
             draw_curves(row[1], seen, _curves(seen, sensor, gain(results, sensor)))
-            row[1].set_ylabel(f"dynamic amplification\n{results.place(sensor)}")
+            part = results.study.sensor[sensor].is_dynamic_part
+            said = "dynamic part over\nthe largest static value" if part else "dynamic amplification"
+            row[1].set_ylabel(f"{said}\n{results.place(sensor)}")
         else:
             row[1].set_visible(False)
     one_legend([axes for row in grid for axes in row[::-1]])
