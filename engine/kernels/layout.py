@@ -92,10 +92,9 @@ class Observation(NamedTuple):
 
     on_q, on_v, on_a (1 or stations, modes, channels);  signal (channels): which signal a channel adds to;
     order (channels): the power of 1/h that makes it SI;  static (stations, signals, ties): deflection per unit
-    force that the kept modes miss;  offset (stations, signals): per unit gravity, in step units of offset_order
-    (signals), the power of 1/h that makes it SI;
-    at_rest (stations, signals, carriages): what a dynamic part leaves out, per unit weight of each carriage;
-    (0, 0, 0) where no signal is one.
+    force that the kept modes miss, and where signals are dynamic parts as many columns more as there are carriages:
+    less what they leave out per unit weight of each;  offset (stations, signals): per unit gravity, in step units of
+    offset_order (signals), the power of 1/h that makes it SI;
     counted (stations, signals): whether the station enters extremes.
     summed (signals): whether squares are summed over time, which wants a signal that counts all along the segment.
     """
@@ -108,7 +107,6 @@ class Observation(NamedTuple):
     static: FloatArray
     offset: FloatArray
     offset_order: IntArray
-    at_rest: FloatArray
     counted: BoolArray
     summed: BoolArray
 

@@ -148,8 +148,7 @@ class SceneTables:
                 missed.extend(found)
         else:
             found = missed[0], missed[1]
-        at_rest = left_out(self.model, self.signals, along)
-        watch = tabulate_watch(self.model, self.signals, along, found[1], at_rest)
+        watch = tabulate_watch(self.model, self.signals, along, found[1], left_out(self.model, self.signals, along))
         contacts = len(self.signals) - len(self.sensors)
         unrecorded, others = (
             (last_signals(watch, contacts), self.signals[-contacts:]) if contacts else (watch, self.signals)
@@ -162,8 +161,11 @@ class SceneTables:
             own = ties_of(self.model, segment.active)
             places = np.searchsorted(numbers, own)
             ties = closed(self.model, rows.part(part, own), self.scheme)
-            watched = signals.along_part(watch, self.signals, part, places)
-            tables.append(SegmentTable(own, ties, watched, signals.along_part(unrecorded, others, part, places)))
+            watched, unseen = (
+                signals.along_part(whole, of, part, places, numbers.size)
+                for whole, of in ((watch, self.signals), (unrecorded, others))
+            )
+            tables.append(SegmentTable(own, ties, watched, unseen))
         return tables
 
     def _missed_of(self, key: SegmentKey) -> Missed:

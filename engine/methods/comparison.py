@@ -309,4 +309,4 @@ def _nothing_watched(modes: int) -> Observation:
     rows, none = np.zeros((1, 0, 4 * -(-modes // 4))), np.zeros(0, dtype=np.int64)
     still = np.zeros((1, 0))
     never = still.astype(np.bool_)
-    return Observation(rows, rows, rows, none, none, np.zeros((1, 0, 1)), still, none, rows[:0], never, never[0])
+    return Observation(rows, rows, rows, none, none, np.zeros((1, 0, 1)), still, none, never, never[0])

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
 Signal = Sensor | ContactForce
 
-NOTHING = np.zeros((0, 0, 0))  # of what dynamic parts leave out
-
 
 def build_sensors(model: SceneModel, accelerated: tuple[CarriageTie, ...] = ()) -> tuple[Sensor, ...]:
     """The sensors in the study's order, then the acceleration across of some carriages."""
@@ -72,27 +70,29 @@ def tabulate_watch(
     signals: tuple[Signal, ...],
     along: Along,
     missed: Array | None = None,
-    at_rest: Array = NOTHING,
+    left_out: Array | None = None,
 ) -> Observation:
-    """Rows of every signal along a segment. missed: of `tabulate_missed`, where it is known; else of all ties. at_rest
-    (stations, signals, C + 1): what dynamic parts leave out, per unit weight of each carriage, and last per unit
-    gravity; (0, 0, 0) where no signal is one."""
+    """Rows of every signal along a segment. missed: of `tabulate_missed`, where it is known; else of all ties. left_out
+    (stations, signals, C + 1): of dynamic parts, per unit weight of each carriage, and last per unit gravity."""
     channels = [(number, channel) for number, signal in enumerate(signals) for channel in signal.channels(model, along)]
     ordered = [(number, channel) for of in "qva" for number, channel in channels if channel.of == of]
     rows = {of: [channel.rows for _, channel in ordered if channel.of == of] for of in "qva"}
     modes = 4 * -(-model.omega.size // 4)
     counted = np.ascontiguousarray(np.stack([s.counted(model, along) for s in signals], axis=1))
     offset = np.stack([s.offset(model, along) for s in signals], axis=1)
+    static = tabulate_missed(model, signals, along, np.arange(model.ties)) if missed is None else missed
+    if left_out is not None:
+        offset = offset - left_out[:, :, -1]
+        static = np.concatenate([static, -left_out[:, :, :-1]], axis=2)
     return Observation(
         on_q=_stacked(rows["q"], modes),
         on_v=_stacked(rows["v"], modes),
         on_a=_stacked(rows["a"], modes),
         signal=np.array([number for number, _ in ordered], dtype=np.int64),
         order=np.array([channel.order for _, channel in ordered], dtype=np.int64),
-        static=tabulate_missed(model, signals, along, np.arange(model.ties)) if missed is None else missed,
-        offset=np.ascontiguousarray(offset - at_rest[:, :, -1] if at_rest.size else offset),
+        static=static,
+        offset=np.ascontiguousarray(offset),
         offset_order=np.array([s.offset_order for s in signals], dtype=np.int64),
-        at_rest=np.ascontiguousarray(at_rest[:, :, :-1]),
         counted=counted,
         summed=_summed(signals, counted),
     )
@@ -103,17 +103,18 @@ def _summed(signals: tuple[Signal, ...], counted: NDArray[np.bool_]) -> NDArray[
     return np.array([s.is_summed for s in signals], dtype=np.bool_) & counted.all(axis=0)
 
 
-def along_part(watch: Observation, signals: tuple[Signal, ...], part: slice, ties: Counts) -> Observation:
-    """The same along some of the stations, as a segment of their own, with some of the ties that it has, by place."""
+def along_part(watch: Observation, signals: tuple[Signal, ...], part: slice, ties: Counts, count: int) -> Observation:
+    """The same along some of the stations, as a segment of their own, with some of the ``count`` ties that it has, by
+    place."""
+    columns = np.append(ties, np.arange(count, watch.static.shape[2]))
     counted = watch.counted[part]
     on_q, on_v, on_a = (rows[part] if len(rows) > 1 else rows for rows in (watch.on_q, watch.on_v, watch.on_a))
     return watch._replace(
         on_q=on_q,
         on_v=on_v,
         on_a=on_a,
-        static=watch.static[part].take(ties, 2),
+        static=watch.static[part].take(columns, 2),
         offset=watch.offset[part],
-        at_rest=watch.at_rest[part],
         counted=counted,
         summed=_summed(signals, counted),
     )
@@ -131,7 +132,6 @@ def last_signals(watch: Observation, count: int) -> Observation:
         static=np.ascontiguousarray(watch.static[:, part]),
         offset=np.ascontiguousarray(watch.offset[:, part]),
         offset_order=watch.offset_order[part],
-        at_rest=NOTHING,
         counted=np.ascontiguousarray(watch.counted[:, part]),
         summed=watch.summed[part],
     )

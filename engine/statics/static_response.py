@@ -53,12 +53,12 @@ def static_readings(model: SceneModel, sensors: Sequence[Sensor], along: Along) 
     return found
 
 
-def left_out(model: SceneModel, signals: Sequence[Signal], along: Along) -> Array:
-    """(S, J, C + 1) the static readings that signals leave out of the whole; (0, 0, 0) where none does."""
+def left_out(model: SceneModel, signals: Sequence[Signal], along: Along) -> Array | None:
+    """(S, J, C + 1) the static readings that signals leave out of the whole; None where none does."""
     readers = [signal.as_sensor(model) for signal in signals]
     parts = [j for j, reader in enumerate(readers) if reader.reads_whole is not reader]
     if not parts:
-        return np.zeros((0, 0, 0))
+        return None
     found = np.zeros((along[0].s.size, len(signals), len(model.carriages) + 1))
     found[:, parts] = static_readings(model, [readers[j].reads_whole for j in parts], along)
     return found

@@ -178,7 +178,6 @@ def marched(one: System, scheme: Newmark) -> tuple[Array, Array]:
         static=np.tile(np.eye(signals, ties, -modes), (STATIONS, 1, 1)),
         offset=np.zeros((STATIONS, signals)),
         offset_order=np.zeros(signals, dtype=np.int64),
-        at_rest=np.zeros((0, 0, 0)),
         counted=np.ones((STATIONS, signals), dtype=np.bool_),
         summed=np.ones(signals, dtype=np.bool_),
     )

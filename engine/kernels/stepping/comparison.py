@@ -34,6 +34,7 @@ from engine.kernels.stepping.record import (
     close_statistics,
     judge_lanes,
     keep,
+    load_weights,
     observe,
     open_statistics,
 )
@@ -137,7 +138,7 @@ def store_modes(now, b, carried, block):
 @kernel
 def note(statistics, scratch, watch, record, block, n, count):
     """Observe and keep station n; a function of its own, so that it is compiled once and not for every rule."""
-    observe(statistics, scratch.now, scratch.b, scratch.weight, watch, n, KEPT)
+    observe(statistics, scratch.now, scratch.b, watch, n, KEPT)
     keep(statistics, record.history[block], watch, record.sample[n], n, float(count + n))
 
 
@@ -152,11 +153,12 @@ def march_by_rule(rule, track, lanes, carried, watch, record, count):
     work = np.zeros((modes, FIELDS, LANES))
     now = np.zeros((4 * ((modes + 3) // 4), MEMORY + 1, LANES))
     sums = np.zeros((SUMS, LANES))
-    b = np.zeros((TIE + 1, LANES))
+    b = np.zeros((TIE + 1 + lanes.weight.shape[1], LANES))
     statistics = np.zeros((watch.offset.shape[1], STATISTICS, LANES))
+    scratch = Scratch(now, work, sums, b)
     for block in range(lanes.step.shape[0]):
-        scratch = Scratch(now, work, sums, b, lanes.weight[block])
         load_modes(now, b, lanes, carried, block)
+        load_weights(b, lanes, block)
         open_statistics(statistics, record.statistics[block])
         for n in range(track.rows.shape[1]):
             take_step(rule, scratch, track, lanes, carried.kept, block, n)

@@ -32,14 +32,12 @@ KEPT = 6
 
 class Scratch(NamedTuple):
     """Arrays of one block: modes as they are (modes in fours, 4, LANES), fields of the step (modes, FIELDS, LANES),
-    sums of the contact's equation (SUMS, LANES), the rows of `record` with the force times h^2 in TIE, and the weights
-    of the carriages (carriages, LANES), N."""
+    sums of the contact's equation (SUMS, LANES), and the rows of `record` with the force times h^2 in TIE."""
 
     now: FloatArray
     work: FloatArray
     sums: FloatArray
     b: FloatArray
-    weight: FloatArray
 
 
 def remembered(scheme, x, e):
@@ -151,7 +149,7 @@ def coupled_force(rule, sums, load, coupling_mass, kept, block, j):
 
 def step_coupled(rule, scratch, track, lanes, kept, block, n):
     """Offsets 0 and 1."""
-    now, work, sums, b, _ = scratch
+    now, work, sums, b = scratch
     gather_now(sums, now, b, track.rows[0, n], track.drive[0, n], work.shape[0])
     predict(rule.scheme, now, work, lanes, block)
     gather(rule.scheme, sums, work, b, track.rows[1, n], track.drive[1, n])
@@ -162,7 +160,7 @@ def step_coupled(rule, scratch, track, lanes, kept, block, n):
 
 def step_wilson(rule, scratch, track, lanes, kept, block, n):
     """Offsets theta and 1 (Wilson 1968). The force that is recorded is m (g - D2w) of the station."""
-    now, work, sums, b, _ = scratch
+    now, work, sums, b = scratch
     theta = rule.theta
     for k in range(work.shape[0]):
         for j in range(LANES):
@@ -241,7 +239,7 @@ def next_stage(now, work, weight, reach):
 
 def step_runge_kutta(rule, scratch, track, lanes, kept, block, n):
     """Offsets 1/2 and 1."""
-    now, work, sums, b, _ = scratch
+    now, work, sums, b = scratch
     start_stages(now, work)
     for stage in range(3):
         at = 0 if stage < 2 else 1
@@ -262,7 +260,7 @@ def step_runge_kutta(rule, scratch, track, lanes, kept, block, n):
 
 def step_rigid(rule, scratch, track, lanes, kept, block, n):
     """Offsets 0, for the start, and 1. The new place of the mass, y* + beta (load - F)/m, is the contact point's."""
-    now, work, sums, b, _ = scratch
+    now, work, sums, b = scratch
     scheme = rule.scheme
     predict(scheme, now, work, lanes, block)
     gather(scheme, sums, work, b, track.rows[1, n], track.drive[1, n])

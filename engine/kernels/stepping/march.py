@@ -42,6 +42,7 @@ from engine.kernels.stepping.record import (
     judge_lanes,
     keep,
     leading,
+    load_weights,
     observe,
     open_statistics,
     put_leads,
@@ -75,6 +76,7 @@ def load_block(work, b, lanes, state, scheme, block):
         b[RATE_0, j] = 1.0
         b[RATE_1, j] = 1.0 / h
         b[RATE_2, j] = 1.0 / (h * h)
+    load_weights(b, lanes, block)
     for k in range(lanes.stiffness.shape[1]):
         for j in range(LANES):
             h = lanes.step[block, j]
@@ -151,7 +153,7 @@ def march_one(ties, lanes, state, watch, record, scheme, count):
     status = np.zeros((lanes.step.shape[0], LANES), np.int8)
     work = np.zeros((modes, fields_of(scheme), LANES))
     now = np.zeros((4 * ((modes + 3) // 4), 3, LANES))
-    b = np.zeros((TIE + 1, LANES))
+    b = np.zeros((TIE + 1 + lanes.weight.shape[1], LANES))
     statistics = np.zeros((watch.offset.shape[1], STATISTICS, LANES))
     for block in range(lanes.step.shape[0]):
         load_block(work, b, lanes, state, scheme, block)
@@ -186,7 +188,7 @@ def march_one(ties, lanes, state, watch, record, scheme, count):
             put_lanes(b, (SUM,), motion - moved)
             put_lanes(b, (FACTOR,), factor)
             put_leads(b, leads, first, second)
-            observe(statistics, now, b, lanes.weight[block], watch, n, leads)
+            observe(statistics, now, b, watch, n, leads)
             keep(statistics, history, watch, record.sample[n], n, float(count + n))
         close_statistics(record.statistics[block], statistics, watch, lanes.step[block], stations - 1)
         judge_lanes(status, statistics, state.q, state.v, block)
@@ -204,7 +206,7 @@ def march_many(ties, lanes, state, watch, record, scheme, count):
     status = np.zeros((lanes.step.shape[0], LANES), np.int8)
     work = np.zeros((modes, fields_of(scheme), LANES))
     now = np.zeros((4 * ((modes + 3) // 4), 3, LANES))
-    b = np.zeros((TIE + many, LANES))
+    b = np.zeros((TIE + many + lanes.weight.shape[1], LANES))
     statistics = np.zeros((watch.offset.shape[1], STATISTICS, LANES))
     own = np.zeros((many, 4, LANES))
     matrix = np.zeros((2 * half, 2 * half, LANES))
@@ -248,7 +250,7 @@ def march_many(ties, lanes, state, watch, record, scheme, count):
                 elif leads < 0:
                     put_modes(now, k, q, v, a)
             put_leads(b, leads, first, second)
-            observe(statistics, now, b, lanes.weight[block], watch, n, leads)
+            observe(statistics, now, b, watch, n, leads)
             keep(statistics, history, watch, record.sample[n], n, float(count + n))
         close_statistics(record.statistics[block], statistics, watch, lanes.step[block], stations - 1)
         judge_lanes(status, statistics, state.q, state.v, block)

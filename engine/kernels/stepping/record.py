@@ -23,7 +23,7 @@ from engine.kernels.layout import (
 )
 from engine.kernels.vector import all_lanes, choose, everywhere, lanes_at, put_lanes
 
-# rows of a block's work array, shared with the march; the forces of all ties stand from TIE on
+# rows of a block's work array, shared with the march; the forces of all ties stand from TIE on, then all weights
 SUM, FACTOR, LEAD, SECOND, GAIN, LOAD, GRAVITY, RATE_0, RATE_1, RATE_2, PUSH, TIE = range(12)
 # fields of the per-mode work array; Newmark's family has the first six
 U, V, C, D, CD, KD, E = range(7)
@@ -73,9 +73,18 @@ def add_modes(statistics, i, now, b, row, field, order):
 
 
 @piece
-def observe(statistics, now, b, weight, watch, n, leads):
-    """Signals of station n in SI units: offset g + sums over the modes + static correction times contact force, less
-    what carriages of so much weight (carriages, LANES) make dynamic parts leave out.
+def load_weights(b, lanes, block):
+    """The weights of the carriages, in step units, behind the forces of all ties."""
+    ties = lanes.load.shape[1]
+    for c in range(lanes.weight.shape[1]):
+        for j in range(LANES):
+            b[TIE + ties + c, j] = lanes.weight[block, c, j] * (lanes.step[block, j] * lanes.step[block, j])
+
+
+@piece
+def observe(statistics, now, b, watch, n, leads):
+    """Signals of station n in SI units: offset g + sums over the modes + static correction times contact force (and,
+    of dynamic parts, times what carriages weigh).
 
     leads: how many sums stand in b[LEAD] and after it already, all of them, or KEPT.
     """
@@ -87,8 +96,6 @@ def observe(statistics, now, b, weight, watch, n, leads):
             missed = watch.static[n, i, r]
             if missed != 0.0:
                 value = value + missed * (lanes_at(b, (TIE + r,)) * lanes_at(b, (RATE_2,)))
-        for c in range(watch.at_rest.shape[2]):
-            value = value - watch.at_rest[n, i, c] * lanes_at(weight, (c,))
         put_lanes(statistics, (i, VALUE), value)
     of_q, of_v, of_a = watch.on_q.shape[1], watch.on_v.shape[1], watch.on_a.shape[1]
     for c in range(leads):

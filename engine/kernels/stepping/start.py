@@ -19,6 +19,7 @@ from engine.kernels.stepping.record import (
     V_NOW,
     copy_statistics,
     keep,
+    load_weights,
     observe,
 )
 
@@ -153,10 +154,11 @@ def watch_start(ties, lanes, state, watch, record, count):
     modes, many, reactive = ties.rows.shape[1], ties.rows.shape[2], ties.reactive.shape[0]
     force, matrix, unknown = np.empty(many), np.empty((reactive, reactive)), np.empty(reactive)
     now = np.zeros((4 * ((modes + 3) // 4), 3, LANES))
-    b = np.zeros((TIE + many, LANES))
+    b = np.zeros((TIE + many + lanes.weight.shape[1], LANES))
     statistics = np.zeros((watch.offset.shape[1], STATISTICS, LANES))
     for block in range(lanes.step.shape[0]):
         copy_statistics(statistics, record.statistics[block])
+        load_weights(b, lanes, block)
         for j in range(LANES):
             h = lanes.step[block, j]
             b[GRAVITY, j] = lanes.gravity[block, j]
@@ -170,7 +172,7 @@ def watch_start(ties, lanes, state, watch, record, count):
             forces_at_start(force, matrix, unknown, ties, lanes, state, (block, j))
             for r in range(many):
                 b[TIE + r, j] = force[r]
-        observe(statistics, now, b, lanes.weight[block], watch, 0, KEPT)
+        observe(statistics, now, b, watch, 0, KEPT)
         keep(statistics, record.history[block], watch, record.sample[0], 0, float(count))
         for i in range(statistics.shape[0]):
             for j in range(LANES):
