@@ -170,7 +170,7 @@ def _ranges(found: Sequence[Range], percentiles: Sequence[float], every: str) ->
     if rows:
         table("", ("result", "smallest", *parts, "largest", ""), rows[:MOST_ROWS], tallest=TALLEST)
     if rows[MOST_ROWS:]:
-        paragraphs(f"{len(rows) - MOST_ROWS} more results: run -v, or the report.")
+        paragraphs(f"{counted(len(rows) - MOST_ROWS, 'more result')}: run -v, or the report.")
     alike = [(one, f"{_name(one)} {one.value(one.largest.value)}") for one in found if one.is_constant]
     same = [words for one, words in alike if not one.partly]
     if same:

@@ -54,12 +54,20 @@ def quiet(results: Results, sensor: str) -> bool:
 
 
 def ringing(results: Results, limits: Limits) -> list[str]:
-    """Sensors whose residual vibration is told, in the order of `in_turns`; none where the study does not tell it."""
+    """Sensors whose residual vibration is told, in the order of `in_turns`; none where the study does not tell it. At
+    rest a dynamic part swings as the whole does: one beside it is left out."""
     if not results.study.output.residual:
         return []
-    return in_turns(
-        results, limits, {name: np.nanmax(residual_of(results, name), initial=0.0) for name in results.sensors}
-    )
+    size = {name: np.nanmax(residual_of(results, name), initial=0.0) for name in results.sensors}
+    return [name for name in in_turns(results, limits, size) if not _has_whole(results, name)]
+
+
+def _has_whole(results: Results, name: str) -> bool:
+    """Whether a sensor reads the dynamic part of what another one reads."""
+    known = results.study.sensor
+    same = [other for other in known if known[other].quantity == known[name].quantity and other != name]
+    wholes = [other for other in same if not known[other].is_dynamic_part]
+    return known[name].is_dynamic_part and results.place(name) in map(results.place, wholes)
 
 
 def residuals(results: Results, limits: Limits) -> list[str]:

@@ -22,7 +22,7 @@ from studies.findings.amplification import (
 )
 from studies.findings.between_speeds import told_between_speeds
 from studies.findings.beyond import LIMIT, MOST_TOLD, AskedOfPassages, ranked, told_limit, where_beyond
-from studies.findings.effects import hardly_changed, told_effects, unchanged
+from studies.findings.effects import by_effect, hardly_changed, told_effects, unchanged
 from studies.findings.envelopes import beyond_sensors, sizes_along, told_along
 from studies.findings.residual import check_residual, most_ringing, residuals
 from studies.protocol.study import Kind, question_of
@@ -185,8 +185,9 @@ def _limited(results: Results, sensor: str) -> str:
     limit = question_of(results.study, AskedOfPassages).of(results.study.sensor[sensor])
     if limit is None:
         return ""
-    error = errors_of_size(results, sensor)
-    return told_limit(results, sizes(results, sensor), limit, results.sensors[sensor], error=error)
+    values, error = sizes(results, sensor), errors_of_size(results, sensor)
+    axis = results.axis(*PACES) or next(iter(by_effect(results, values)), None)
+    return told_limit(results, values, limit, results.sensors[sensor], axis, error)
 
 
 def _with_remark(said: list[str], remark: str) -> list[str]:

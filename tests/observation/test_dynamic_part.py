@@ -125,6 +125,26 @@ def test_answers_tell_it_beside_statics_and_judge_it_by_a_limit_of_its_own() -> 
     assert hint in " ".join(studies.answer(alone))
 
 
+def test_what_swings_on_is_told_of_the_whole_alone() -> None:
+    """At rest both swing alike; without the whole beside it that of the part is told. Limits along what is swept."""
+    motion = {"kind": "point-to-point", "start": 0.2, "end": 0.6, "speed": 1.0, "acceleration": 4.0, "dwell": 2.0}
+    stop = study(
+        beam(damping_ratio=0.05),
+        force(FORCE, motion),
+        sensor=parts({"place": fixed(0.5)}),
+        output={"residual": True},
+        question={"dynamic_part": {"displacement": 3e-3}},
+        sweep={"acceleration": {"of": "carriage.car.motion.acceleration", "values": [2.0, 4.0, 8.0, 16.0]}},
+    )
+    found = studies.run(stop)
+    told = " ".join(studies.answer(found))
+    assert found.place_part_residual.values == pytest.approx(found.place_residual.values, rel=1e-2)
+    assert "place: at rest it still swings" in told and "place_part: at rest" not in told
+    assert "Its absolute value exceeds 3 mm from 4 m/s² to the end of the sweep, 16 m/s²." in told
+    alone = studies.run(stop.with_values({"sensor": {"part": fixed(0.5) | {"part": "dynamic"}}}))
+    assert "part: at rest it still swings" in " ".join(studies.answer(alone))
+
+
 @pytest.mark.parametrize(
     ("sensor", "changes", "message"),
     [
