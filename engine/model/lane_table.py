@@ -107,15 +107,15 @@ def lane_table(model: SceneModel, values: VariantValues) -> LaneTable:
     coefficients += [values.column(spring.keys.damping) for spring in model.springs]
     pushes, alongside = [none] * len(model.pushes), [moving_mass(model, values, p.carriage) for p in model.pushes]
     stiffness = [none if spring.rigid else values.column(spring.keys.stiffness) for spring in model.springs]
-    ones, others = np.ones((model.body_modes, values.size)), model.omega.size - model.body_modes
-    added = others - len(model.sprung)
+    sprung = [1.0 / values.column(s.keys.mass)[None] for s in model.sprung]
+    added = model.omega.size - model.body_modes - len(sprung)
     residual = [rates[push.body][-1:] for push in model.corrected]  # damped as the highest mode kept
     damped = np.concatenate([*rates, np.zeros((len(model.sprung), values.size)), *residual])
     return LaneTable(
         omega=model.omega,
         rates=to_blocks(np.pad(damped, ((0, model.omega.size - len(damped)), (0, 0)))),
         inverse_modal_mass=to_blocks(
-            np.concatenate([ones, *(1.0 / values.column(s.keys.mass)[None] for s in model.sprung), ones[:added]])
+            np.concatenate([np.ones((model.body_modes, values.size)), *sprung, np.ones((added, values.size))])
         ),
         mass=to_blocks(np.stack(masses + dampers + springs + alongside)),
         joint=to_blocks(np.stack(carriages + dampers + rigid + pushes)),

@@ -21,6 +21,16 @@ _TAGS = {NUMBER: "a number", WORD: "a word in quotes", LIST: "a list", TABLE: "a
 _BOUNDS: tuple[tuple[type, str, str], ...] = ((Gt, "gt", ">"), (Ge, "ge", ">="), (Lt, "lt", "<"), (Le, "le", "<="))
 
 
+def _may_be_table(annotation: Any) -> bool:
+    """Whether a value of a type may be a table, not only a word, a number or a list."""
+    origin, args = get_origin(annotation), get_args(annotation)
+    if origin is Annotated:
+        return _may_be_table(args[0])
+    if origin in (Union, UnionType):
+        return any(map(_may_be_table, args))
+    return annotation not in (Any, str, int, float, bool) and origin not in (tuple, list)
+
+
 class FieldType(NamedTuple):
     """Type and annotations of the place that a dotted key names."""
 
@@ -58,7 +68,7 @@ class FieldType(NamedTuple):
     @property
     def holds_named_tables(self) -> bool:
         """Whether it is a table of tables that have names of the user's choice."""
-        return get_origin(self.annotation) is dict and get_args(self.annotation)[1] is not Any
+        return get_origin(self.annotation) is dict and _may_be_table(get_args(self.annotation)[1])
 
     def describe(self) -> str:
         """What belongs there, in words, as far as annotations tell: "a length (m), > 0"."""
@@ -156,24 +166,31 @@ def _misplaced(model: type[Spec], data: Any, keys: Keys) -> str:
     place, around = (field_at(model, data, part) if part else None for part in (keys, keys[:-1]))
     if place is not None and place.holds_named_tables:
         return f"[{keys[-1]}.NAME], a table with a name of your choice"
-    if isinstance(value, dict) or str(keys[-1]) in keys_at(model, data, keys[:-1]):
+    if str(keys[-1]) in keys_at(model, data, keys[:-1]):
         return ""
+    if isinstance(value, dict):
+        return _of_other_kinds(around, str(keys[-1]))
     if around is not None and around.holds_named_tables:
         return f"[{keys[-2]}.NAME] as the header: a table with a name of your choice"
     return _where_else(model, data, around, keys)
 
 
+def _of_other_kinds(around: FieldType | None, key: str) -> str:
+    """The kinds of a table that have a key, in words, or ""."""
+    tables = [note.table for note in around.notes if isinstance(note, KindOf)] if around else []
+    fitting = [kind for table in tables for kind, cls in table.items() if _field_of(cls, key) is not None]
+    return f"{key} is a key of the kind {' and '.join(shortened(kind) for kind in fitting)}" if fitting else ""
+
+
 def _where_else(model: type[Spec], data: Any, around: FieldType | None, keys: Keys) -> str:
     """The table, or the kind of its own table, that has the key of this name, in words, or ""."""
     key, here = str(keys[-1]), list(keys[:-1])
-    tables_of_kinds = [note.table for note in around.notes if isinstance(note, KindOf)] if around else []
-    if tables_of_kinds and key == "kind":
+    if key == "kind" and around is not None and any(isinstance(note, KindOf) for note in around.notes):
         return ABSENT
     if here and key in keys_at(model, data, ()):
         return f"write {key} at the top of the file: a key belongs to the table whose [header] stands above it"
-    fitting = [kind for table in tables_of_kinds for kind, cls in table.items() if _field_of(cls, key) is not None]
-    if fitting:
-        return f"{key} is a key of the kind {' and '.join(shortened(kind) for kind in fitting)}"
+    if fitting := _of_other_kinds(around, key):
+        return fitting
     if isinstance(value_at(data, keys), list):  # the same word may well be the name of an axis
         return ""
     whole: dict[str, Any] = {name: {} for name in keys_at(model, data, ())} | data

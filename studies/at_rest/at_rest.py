@@ -19,7 +19,7 @@ from engine.scene.carriages import MAX_CONTACTS
 from engine.scene.study import Study
 from engine.scene.sweep import expand
 from engine.scene.variants import VariantValues
-from results_schema.arrays import Array, Counts
+from results_schema.arrays import Array, Counts, Mask
 from results_schema.errors import BadInput
 from results_schema.lazy_imports import xr
 from results_schema.status import Fidelity, Status
@@ -155,11 +155,10 @@ def _variants(kind: AtRestKind, study: Study, places: Positions, part: slice, wo
 def _evaluated(
     kind: AtRestKind, model: SceneModel, values: VariantValues, places: Positions
 ) -> dict[str, NDArray[Any]]:
-    """Results of some variants of a scene, with NaN where a contact is off the body."""
+    """Results of some variants of a scene, with NaN where a contact is off the body, or all axles of a train are."""
     along = frozen(model, places.all)
     found = dict(kind.variants(model, values, along))
-    own = [along[rider].here for rider in {0, *(load.rider for load in model.carriages[0].loads)}]
-    gone = ~np.all([here for here in own if here is not None], axis=0)
+    gone = _gone(model, along)
     opened = found.pop("opened", np.zeros((values.size, places.all.size), dtype=np.bool_)) & ~gone
     for array in found.values():
         array[:, gone] = np.nan
@@ -168,6 +167,15 @@ def _evaluated(
     found["fidelity"] = np.full(values.size, int(kind.fidelity(model)))
     found["modes"] = np.full(values.size, model.body_modes)
     return found
+
+
+def _gone(model: SceneModel, along: Along) -> Mask:
+    """(S,) where the first carriage is off its body with any contact, or its whole train is."""
+    train = model.study.axles.get(model.carriages[0].name)
+    own = {0, *(load.rider for load in model.carriages[0].loads)}
+    axles = {number for number, one in enumerate(model.carriages) if model.study.axles.get(one.name) == train}
+    on = np.stack([here for rider in (own if train is None else axles) if (here := along[rider].here) is not None])
+    return np.asarray(~(on.all(axis=0) if train is None else on.any(axis=0)))
 
 
 def _errors(kind: AtRestKind, model: SceneModel, values: VariantValues, positions: Array, found: Named) -> Named:

@@ -7,6 +7,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, Strict, Tag
 
 from engine.model.scene_model import SceneModel
+from engine.model.station_path import in_row
 from engine.scene.study import Study
 from engine.study_file.spec import LIST, NUMBER, Spec, ascending, by_form
 from engine.study_file.units import Length
@@ -52,7 +53,7 @@ class Positions(NamedTuple):
 
 def positions_of(study: Study, asked: Asked) -> Positions:
     """The positions of a study. Raises BadInput where there are none, or one is off the body."""
-    low, high = way_of(study)
+    low, high = _way_of_train(study)
     if isinstance(asked.positions, int):
         found = np.linspace(low, high, asked.positions)
     else:
@@ -71,13 +72,22 @@ def positions_of(study: Study, asked: Asked) -> Positions:
     return Positions(found, np.array(sorted({middle, last})), np.array(compared, dtype=np.int64))
 
 
+def _way_of_train(study: Study) -> tuple[float, float]:
+    """The same of a first axle, on beyond its body until the last axle of its train has left; else `way_of`."""
+    (low, high), (name, carriage) = way_of(study), first_carriage(study)
+    own = [axle for axle, train in study.axles.items() if train == study.axles.get(name)]
+    behind = max((study.carriage[axle].headway or 0.0 for axle in own), default=0.0)
+    start, end = (float(carriage.motion.path(tau).S) for tau in (0.0, carriage.motion.duration))
+    return (low, high + behind) if end > start else (low - behind, high)
+
+
 def way_of(study: Study) -> tuple[float, float]:
     """Ends of the first carriage's way, as far as it stands on its body with all its contacts, m. For a list of
     positions that is all that its body allows. Raises BadInput where there is no such part."""
     name, carriage = first_carriage(study)
     rides, lengths = carriage.riding_body, [float(study.value(f"body.{body}.length")) for body in carriage.ridden]
     ahead = carriage.contact_offsets(0.0 if rides is None else float(study.value(f"body.{rides}.length")))
-    low, high = -min(ahead), min(length - offset for length, offset in zip(lengths, ahead, strict=True))
+    low, high = 0.0 - min(ahead), min(length - offset for length, offset in zip(lengths, ahead, strict=True))
     free = f"{low:.6g} to {high:.6g} m"
     if not isinstance(study.question.get("positions"), list | tuple):
         first, last = carriage.motion.range()
@@ -104,6 +114,6 @@ def with_modes(study: Study, count: int, others: Mapping[str, Any]) -> Study:
 
 
 def all_positions(model: SceneModel, positions: Array) -> Array:
-    """(S, C) places of all carriages in m, the first one at `positions`, the others where they start."""
-    starts = [float(carriage.rider.motion.path(0.0).S) for carriage in model.carriages]
-    return np.stack([positions, *(np.full_like(positions, start) for start in starts[1:])], axis=1)
+    """(S, C) places of all carriages in m, the first one at `positions`, the other axles of its train behind it, the
+    others where they start."""
+    return np.stack([in_row(model, carriage.name, positions) for carriage in model.carriages], axis=1)

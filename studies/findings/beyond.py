@@ -10,7 +10,7 @@ from pydantic import Field
 from engine.scene.sensors import Sensor
 from engine.scene.study import Study
 from engine.study_file.spec import Spec
-from engine.study_file.units import Acceleration, Dimensionless, Length, Pressure, Speed, Torque
+from engine.study_file.units import Acceleration, Dimensionless, Force, Length, Pressure, Speed, Torque
 from results_schema.arrays import Array, Mask
 from studies.findings.amplification import largest, sizes
 from studies.protocol.study import kind_named, question_of
@@ -25,7 +25,7 @@ MOST_TOLD = 3  # values of another swept number that are told one by one
 GAP = 3.0  # times the usual distance of two values of a sweep
 LIMIT = " Its absolute value exceeds "
 LIMITED = (
-    *("displacement", "velocity", "acceleration", "bending_moment", "stress"),
+    *("displacement", "velocity", "acceleration", "bending_moment", "stress", "support_reaction"),
     *("position_error", "drive_torque", "drive_force"),
 )
 
@@ -38,6 +38,7 @@ class Limits(Spec):
     acceleration: Annotated[Acceleration, Field(gt=0)] | None = None
     bending_moment: Annotated[Torque, Field(gt=0)] | None = None
     stress: Annotated[Pressure, Field(gt=0)] | None = None
+    support_reaction: Annotated[Force, Field(gt=0)] | None = None
 
     def limit(self, name: str) -> float | None:
         """What is named for a quantity."""

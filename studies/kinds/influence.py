@@ -6,13 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.model.scene_model import SceneModel
-from engine.model.station_path import Along
+from engine.model.station_path import Along, frozen
 from engine.observation.contact_forces import contact_forces
+from engine.observation.readings import Sensor
 from engine.observation.signals import build_sensors
 from engine.scene.study import Study
 from engine.scene.variants import VariantValues
 from engine.statics.static_response import contact_names, static_shapes, static_values
-from results_schema.arrays import Array
+from results_schema.arrays import Array, Mask
 from results_schema.quantities import QUANTITIES
 from results_schema.status import Fidelity
 from results_schema.variable import outputs
@@ -32,26 +33,27 @@ LIFTS = 1e-9  # of the weights: a smaller pull of a contact is rounding
 RESULTS = outputs("""
     {sensor} | position | {sensor} | nan | static reading of {sensor}
         at rest under gravity and the carriages' weights and forces, own weight of bodies included where it acts; NaN
-        where a contact is off the body
+        where a contact, or a whole train, is off the body
     {sensor}_influence | position | {sensor} N-1 | nan | influence line of {sensor}
-        static reading per newton of the first carriage's weight alone, spread over its contacts as at rest
+        static reading per newton of the first carriage's weight alone, spread over its contacts as at rest; NaN where
+        it is off the body
     contact_force | position contact | N | nan | static force at every contact
-        at rest under gravity and the carriages' weights and forces; NaN where a contact of the first carriage is off
-        the body
+        at rest under gravity and the carriages' weights and forces; NaN where a contact of the first carriage, or a
+        train's axle, is off the body
     deflection | on_body position body_place | m | alone |
         static deflection along every body, of the scene without sweep
         at rest under gravity and the carriages' weights and forces, as displacement sensors count it
-    {sensor}_by_mode_count | correction mode_count checked_position | {sensor} | optional alone |
+    {sensor}_by_mode_count | correction mode_count checked_position | {sensor} | optional alone nan |
         static reading of {sensor} with other numbers of modes of every body
         of the scene without sweep
-    {sensor}_unreduced | unreduced_position | {sensor} | optional alone |
+    {sensor}_unreduced | unreduced_position | {sensor} | optional alone nan |
         static reading of {sensor} by the unreduced finite-element model
         of the scene without sweep
-    {sensor}_difference | unreduced_position | | optional alone | difference of {sensor} from the unreduced model
+    {sensor}_difference | unreduced_position | | optional alone nan | difference of {sensor} from the unreduced model
         over the largest reading at these positions
-    contact_force_unreduced | unreduced_position contact | N | optional alone |
+    contact_force_unreduced | unreduced_position contact | N | optional alone nan |
         static force at every contact by the unreduced finite-element model
-    contact_force_difference | unreduced_position contact | | optional alone |
+    contact_force_difference | unreduced_position contact | | optional alone nan |
         difference of contact forces from the unreduced model
         over the largest force at these positions
     contact | | | axis str | contact
@@ -83,16 +85,18 @@ class Influence(AtRestKind):
         super().check(study)
 
     def variants(self, model: SceneModel, values: VariantValues, along: Along) -> dict[str, NDArray[Any]]:
-        found = static_values(model, build_sensors(model), values, along)
-        named: dict[str, NDArray[Any]] = {}
+        named, sensors = dict[str, NDArray[Any]](), build_sensors(model)
+        found, first = static_values(model, sensors, values, along), _on_bodies(along, [0])[:, 0]
         for j, sensor in enumerate(model.study.sensor):
-            named[sensor] = found.sensors[:, :, j]
-            line = np.broadcast_to(found.influence[:, j], found.sensors.shape[:2])
-            named[f"{sensor}_influence"] = line.copy()
-        reacts = np.array([model.reacts(contact.carriage) for contact in contact_forces(model)])
-        size = np.abs(found.contacts).max(axis=(1, 2), keepdims=True, initial=0.0)
-        named["opened"] = ((found.contacts < -LIFTS * size) & reacts).any(axis=2)
-        return {**named, "contact_force": found.contacts}
+            named[sensor] = np.where(_read(along, sensors[j], model), found.sensors[:, :, j], np.nan)
+            line = np.where(first, found.influence[:, j], np.nan)
+            named[f"{sensor}_influence"] = np.broadcast_to(line, found.sensors.shape[:2]).copy()
+        touching = contact_forces(model)
+        reacts = np.array([model.reacts(contact.carriage) for contact in touching])
+        contacts = np.where(_on_bodies(along, [contact.rides(model) for contact in touching]), found.contacts, np.nan)
+        size = np.nanmax(np.abs(contacts), axis=(1, 2), keepdims=True, initial=0.0)
+        named["opened"] = ((contacts < -LIFTS * size) & reacts).any(axis=2)
+        return {**named, "contact_force": contacts}
 
     def shapes(self, model: SceneModel, along: Along) -> dict[str, NDArray[Any]]:
         values = VariantValues(model.study, {}, 1)
@@ -108,7 +112,9 @@ class Influence(AtRestKind):
 
         full = unreduced_model(study)
         sensors, forces = unreduced_statics(full, all_positions(model, positions))
-        found = {name: sensors[:, j] for j, name in enumerate(study.sensor)}
+        along, readers = frozen(model, positions), build_sensors(model)
+        read = [np.where(_read(along, reader, model), sensors[:, j], np.nan) for j, reader in enumerate(readers)]
+        found = dict(zip(study.sensor, read, strict=True))
         ties = [tie.name for tie in full.ties]
         contacts = [name.replace(".", "_") for name in contact_names(model)]
         parts = [sum(forces[:, r] for r, tie in enumerate(ties) if tie == name) for name in contacts]
@@ -131,6 +137,19 @@ class Influence(AtRestKind):
 
 
 KIND = Influence()
+
+
+def _read(along: Along, sensor: Sensor, model: SceneModel) -> Mask:
+    """(S,) whether a sensor reads anything: one that rides does where its carriage stands on its body."""
+    rider = sensor.rides(model)
+    return np.ones(along[0].s.size, dtype=np.bool_) if rider is None else _on_bodies(along, [rider])[:, 0]
+
+
+def _on_bodies(along: Along, riders: list[int]) -> Mask:
+    """(S, K) whether riders stand on their bodies."""
+    here = [along[rider].here for rider in riders]
+    on = [np.ones(along[0].s.size, dtype=np.bool_) if one is None else one for one in here]
+    return np.stack(on, axis=1) if on else np.zeros((along[0].s.size, 0), dtype=np.bool_)
 
 
 def _span(results: Results, sensor: str) -> str:
@@ -159,7 +178,7 @@ def _own_weight(results: Results, sensor: str, place: Index) -> str:
     study, found = results.study, results.dataset
     if len(study.carriage) > 1 or not any(body.own_weight for body in study.body.values()):
         return ""
-    weight = float(found["contact_force"].values[place].sum())  # at rest all contacts together
+    weight = float(np.nansum(found["contact_force"].values[place]))  # at rest all contacts together
     whole = float(found[sensor].values[place])
     part = 1.0 - weight * float(found[f"{sensor}_influence"].values[place]) / whole
     return f" ({percent(part)} of that by own weight)" if whole > 0.0 and ROUNDING < part <= 1.0 else ""
@@ -185,7 +204,7 @@ def _contacts(results: Results) -> list[str]:
 def _unreduced(results: Results) -> list[str]:
     """How far the readings are from those of the unreduced model."""
     found = {name: results.dataset.get(f"{name}_difference") for name in results.sensors}
-    known = {name: float(np.abs(one.values).max()) for name, one in found.items() if one is not None}
+    known = {name: float(np.nanmax(np.abs(one.values))) for name, one in found.items() if one is not None}
     if not known:
         return []
     worst = max(known, key=lambda name: known[name])

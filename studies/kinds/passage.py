@@ -21,7 +21,7 @@ from studies.findings.amplification import (
     with_own_weight,
 )
 from studies.findings.between_speeds import told_between_speeds
-from studies.findings.beyond import LIMIT, MOST_TOLD, AskedOfPassages, ranked, told_limit, where_beyond
+from studies.findings.beyond import LIMIT, MOST_TOLD, AskedOfPassages, largest_size, ranked, told_limit, where_beyond
 from studies.findings.effects import by_effect, hardly_changed, told_effects, unchanged
 from studies.findings.envelopes import beyond_sensors, sizes_along, told_along
 from studies.findings.residual import check_residual, most_ringing, residuals
@@ -35,7 +35,7 @@ from studies.results.findings_common import (
     uncertainty,
     while_held,
 )
-from studies.results.formatting import counted, listed, number, quantity, times
+from studies.results.formatting import ROUNDING, counted, listed, number, quantity, times
 from studies.results.places import Index, chosen, extreme
 from studies.results.results import Results
 
@@ -68,7 +68,7 @@ class Passage(Kind):
         return with_amplification(dataset, study)
 
     def findings(self, results: Results) -> list[str]:
-        told, (envelopes, sensors) = (_largest, _amplified, _limited), _told(results)
+        told, (envelopes, sensors) = (_largest, _amplified, _limited, _uplift), _told(results)
         said = [told_along(results, name) for name in envelopes]
         said += [
             f"{sensor}: it reads nothing but rounding."
@@ -78,7 +78,7 @@ class Passage(Kind):
         ]
         said = _with_remark(said, told_between_speeds(results))
         if sensors:  # of which those after the first may be cut
-            said[len(envelopes)] += _amplified_besides(results, sensors[0])
+            said[len(envelopes)] += _limited_besides(results, sensors[0]) + _amplified_besides(results, sensors[0])
         said[0] += _effects(results, envelopes, sensors)
         opened = _opened(results)
         lifted = [_lifted(results, opened)] if opened else []
@@ -188,6 +188,35 @@ def _limited(results: Results, sensor: str) -> str:
     values, error = sizes(results, sensor), errors_of_size(results, sensor)
     axis = results.axis(*PACES) or next(iter(by_effect(results, values)), None)
     return told_limit(results, values, limit, results.sensors[sensor], axis, error)
+
+
+def _limited_besides(results: Results, told: str) -> str:
+    """Which sensors besides that one are beyond their limits, those by the most first."""
+    limits, most = question_of(results.study, AskedOfPassages), dict[str, float]()
+    for name in results.sensors:
+        limit, size = limits.of(results.study.sensor[name]), largest_size(results, name)
+        if name != told and limit is not None and size > limit:
+            most[name] = size / limit
+    if not most:
+        return ""
+    order = sorted(most, key=lambda name: -most[name])
+    words = [f"{one} (up to {quantity(largest_size(results, one), results.sensors[one])})" for one in order[:MOST_TOLD]]
+    words += [f"{len(order) - MOST_TOLD} more"] * (len(order) > MOST_TOLD)
+    exceed = "exceeds its limit" if len(order) == 1 else "exceed their limits"
+    return f" Of the other sensors {listed(words)} {exceed}."
+
+
+def _uplift(results: Results, sensor: str) -> str:
+    """That a support would be lifted off, and where most; "" where it is pressed, or reads something else."""
+    own = results.study.sensor[sensor]
+    if not own.reads.of_support or own.reads.turns:
+        return ""
+    least = np.where(results.with_values, results.everywhere(results.dataset[f"{sensor}_min"]), np.nan)
+    place = extreme(-least)
+    if place is None or least[place] >= -ROUNDING * sizes(results, sensor)[place]:
+        return ""
+    weight = "" if results.study.body[results.study.body_of(sensor)].own_weight else ", own weight not counted"
+    return f" It pulls by up to {quantity(-float(least[place]), 'N')}{in_words(results, place)}{weight}."
 
 
 def _with_remark(said: list[str], remark: str) -> list[str]:

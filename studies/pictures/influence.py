@@ -144,7 +144,7 @@ def _draw_shapes(results: Results, drawing: Drawing) -> None:
             x, y = body.at(position), lines[place] * scale.factor
             label = f"{results.carriage_name} at {quantity(position, 'm')}"
             axes.plot(x, y, color=colour if len(chosen_places) > 1 else BLUE, label=label)
-            if body.name == results.carriage.on:
+            if body.name == results.carriage.on and x.min() <= position <= x.max():  # the first axle of a train leaves
                 at_rest.carriage_marks(axes, results, position, float(np.interp(position, x, y)))
         axes.set_ylabel(f"deflection\nof {body.name} ({scale.unit})")
         axes.invert_yaxis()

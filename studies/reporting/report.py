@@ -241,8 +241,11 @@ def check_folder(folder: Path, page: str) -> None:
 
 def _facts(results: Results, noun: str) -> list[Row]:
     """The run in a line."""
-    fine = results.status_counts.get(Status.OK, 0)
-    counts = [Row(f"{noun}s", f"{results.variants:,}"), Row("status ok", f"{fine:,}")]
+    known = {Status.OK: 0} | results.status_counts
+    counts = [
+        Row(f"{noun}s", f"{results.variants:,}"),
+        *(Row(f"status {label(s)}", f"{n:,}") for s, n in known.items()),
+    ]
     return [Row("kind of study", results.study.kind), *(counts if results.size > 1 or _statuses(results) else ())]
 
 

@@ -56,6 +56,11 @@ def write_table(results: Results, path: Path, chosen: Sequence[str] = ()) -> lis
     files.check_new_place(path)
     parts = _parts(results)
     table, left_out = table_of(next(parts), chosen)
+    if nowhere := [name for name in chosen if name in left_out]:
+        what, expected = f"{nowhere[0]} has other dimensions than a table's rows", "results with one number a variant"
+        ends = [name for name in (f"{nowhere[0]}_max", f"{nowhere[0]}_min") if name in results.dataset]
+        remedy = f"its extremes, {','.join(ends)}" if ends else ""
+        raise BadInput(what, where="--results", expected=expected, received=nowhere[0], remedy=remedy)
     tables = chain([table], (table_of(part, chosen)[0] for part in parts))
     try:
         files.write_whole(path, partial(WRITERS[path.suffix], tables=tables))

@@ -156,6 +156,7 @@ REFUSED: dict[str, tuple[dict[str, Any], list[str]]] = {
     "spring to itself": ({"spring.brace.to": "a"}, ["spring.brace.to", "another node"]),
     "mode left out": ({"leave_out": [11]}, ["leave_out.0", "modes = 10"]),
     "nothing left": ({"leave_out": [1, 2, 3, 4, 5, 6, 7, 8, 9, 10]}, ["leave_out", "no mode is left"]),
+    "a roller": ({"supports.a": "roller"}, ["supports.a", 'did you mean "["z"]"']),
     "off the plane": ({"plane": "xz"}, ["off the plane"]),
     "unit": ({"section.deck.area": "2 kg"}, ["section.deck.area", "area"]),
 }
@@ -175,6 +176,20 @@ def test_refusals_name_the_place(name: str) -> None:
     assert "bridge" in message or "carriage" in message
     for word in words:
         assert word in message, message
+
+
+def test_a_support_that_holds_nothing_in_a_plane_is_refused() -> None:
+    """It was taken, and the lowest frequency of a bridge was 0.81 Hz in place of 2.52."""
+    rail = straight({"a": ["x", "z"], "b": ["y"]}, plane="xz")
+    with pytest.raises(
+        BadInput, match=r"supports\.b: in a frame of the plane xz no node moves.*expected some of x, z, ry"
+    ):
+        load(write_document(STUDY | {"body": {"bridge": rail}}))
+
+
+def test_a_key_of_another_kind_of_body_is_told_as_that() -> None:
+    with pytest.raises(BadInput, match=r'body\.bridge\.node: unknown key.*node is a key of the kind "frame"'):
+        load(write_document(STUDY | {"body": {"bridge": UNIFORM | {"node": {"a": [0.0, 0.0, 0.0]}}}}))
 
 
 def test_unconnected_frames_are_refused() -> None:

@@ -137,6 +137,15 @@ def test_export_writes_one_row_per_variant(here: Path, capsys: Captured) -> None
     assert main(["export", "small.nc", "small.xls"]) == 2
 
 
+def test_histories_are_no_rows_of_a_table(here: Path, capsys: Captured) -> None:
+    """A file without what was asked for was written, and the command said that it had done so."""
+    write(here)
+    assert main(["run", "small.toml"]) == 0
+    assert main(["export", "small.nc", "small.csv", "--results", "midspan"]) == 2
+    assert "its extremes, midspan_max,midspan_min" in " ".join(capsys.readouterr().err.split())
+    assert not Path("small.csv").exists()
+
+
 def exported(archive: str, *arguments: str) -> list[dict[str, str]]:
     Path("own.csv").unlink(missing_ok=True)
     assert main(["export", archive, "own.csv", *arguments]) == 0

@@ -10,8 +10,9 @@ from studies.commands import screens
 from studies.findings.amplification import sizes, with_derived_errors
 from studies.protocol.study import kind_of
 from studies.reporting import answers, summary
+from studies.results.formatting import quantity
 from studies.results.results import Results
-from tests.engine.build import beam, cruise, fixed, mass
+from tests.engine.build import beam, cruise, fixed, force, mass
 from tests.engine.build import study as built
 from tests.studies import scenes
 
@@ -121,3 +122,20 @@ def test_other_sensors_that_exceed_statics_are_told_with_the_first() -> None:
         f"Of the other sensors end (up to {gain['end']:.3g}) exceeds a dynamic amplification of 1.1."
         in answers.answer(found)[0]
     )
+
+
+def test_sensors_beyond_their_limits_and_supports_that_pull_are_told() -> None:
+    """An acceleration of 3.9 m/s2 where 3.5 were allowed stood in the report alone, and uplift nowhere."""
+    sensors = {"left": fixed(0.0, "support_reaction"), "middle": fixed(0.5), "quarter": fixed(0.25)}
+    speeds = {"speed": {"of": "carriage.car.motion.speed", "values": [0.5, 2.0, 4.0]}}
+    asked = {"displacement": 1e-3, "support_reaction": 10.0}
+    jib = beam(supports=[{"at": 0.0, "stiffness": 1e4}, {"at": 0.7, "stiffness": 1e4}])
+    found = studies.run(built(jib, force(3.0, cruise(0.0, 1.0, 0.1)), sensor=sensors, sweep=speeds, question=asked))
+    told = "\n".join(answers.answer(found))
+    least = float(found.left_min.min())
+    assert least < -0.5
+    assert f"It pulls by up to {quantity(-least, 'N')} at speed" in told and "own weight not counted" in told
+    quarter = float(np.maximum(found.quarter_max, -found.quarter_min).max())
+    other = "middle" if told.startswith("quarter") else "quarter"
+    size = float(np.maximum(found[f"{other}_max"], -found[f"{other}_min"]).max())
+    assert quarter > 1e-3 and f"Of the other sensors {other} (up to {quantity(size, 'm')}) exceeds its limit." in told

@@ -14,8 +14,9 @@ from engine.scene.study import Study
 from engine.scene.variants import VariantValues
 from engine.statics.coupled_modes import coupled_frequencies, coupled_modes
 from results_schema.arrays import Array
+from tests.bodies.frames import PINNED, straight
 from tests.engine.bodies_on_contacts import FLEXIBLE, FRAME, RIGID, SHOES, THREE, TWO, UNEVEN, riding
-from tests.engine.build import Table, beam, cruise, force, mass, oscillator, study, swing
+from tests.engine.build import Table, beam, cruise, force, mass, oscillator, steel, study, swing
 
 WAY = cruise(0.0, 1.0, 1.0)
 PLAIN: Table = {"static_correction": False}
@@ -144,3 +145,16 @@ def test_shapes_have_unit_modal_mass_and_solve_the_equations() -> None:
     assert omega == pytest.approx(frequencies(case, [0.4], 6)[0, 0], rel=1e-12)
     energy = np.sum((model.omega[:, None] * shapes) ** 2, axis=0)
     assert (energy < omega**2).all()  # the rest is in the contacts
+
+
+def test_more_masses_that_push_across_than_modes() -> None:
+    """Residual modes of more pushes than there are modes had no modal mass: `check` of a train of 12 axles ended in a
+    bug. A few of as much mass altogether are as heavy."""
+
+    def low(count: int) -> Array:
+        car = mass(120.0 / count, cruise(7.5, 15.0, 1.0), on="rail", inertia_across=True)
+        axles = {f"m{number}": car for number in range(count)}
+        rail = {"rail": straight(PINNED, modes=2)}
+        return frequencies(study(steel(15.0), axles, body=rail, sensor={}), [7.5], 2)[0, 0]
+
+    assert low(5) == pytest.approx(low(1), rel=1e-6)

@@ -67,7 +67,8 @@ _ZERO = (0.0, 0.0, 0.0)
 
 _DirectionWord = Annotated[str, AfterValidator(one_of(*DIRECTIONS))]
 _Directions = Annotated[Several[_DirectionWord], Field(min_length=1, max_length=6), AfterValidator(distinct)]
-_HoldWord = Annotated[str, AfterValidator(one_of(*HELD_AT, meant={"fixed": "clamped", "hinged": "pinned"}))]
+_MEANT = {"fixed": "clamped", "hinged": "pinned", "roller": '["z"]'}
+_HoldWord = Annotated[str, AfterValidator(one_of(*HELD_AT, meant=_MEANT))]
 Support = Annotated[Annotated[_HoldWord, Tag(WORD)] | Annotated[_Directions, Tag(LIST)], by_form]
 
 

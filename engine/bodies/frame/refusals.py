@@ -160,6 +160,12 @@ def _check_plane(frame: Frame) -> None:
         if vector is not None and vector[across] != 0.0:
             axis = "xyz"[across]
             refuse(key, "off the plane", expected=f"{axis} = 0 in a frame of the plane {frame.plane}")
+    for node in frame.supports:
+        held = frame.holds(node)
+        if not set(held) - set(frame.still):
+            what = f"in a frame of the plane {frame.plane} no node moves so, and nothing is held"
+            moves = ", ".join(direction for direction in DIRECTIONS if direction not in frame.still)
+            refuse(("supports", node), what, expected=f"some of {moves}", received=", ".join(held))
 
 
 def _check_track(frame: Frame) -> None:
