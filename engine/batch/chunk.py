@@ -59,13 +59,16 @@ def run_chunk(
 
 
 def told_errors(found: Found, results: tuple[Result, ...]) -> Array:
-    """(R, V) the estimated errors; of places no less than a step is long, and no more than the track."""
+    """(R, V) the estimated errors; of places no less than a step is long, and no more than the track;
+    NaN of times that are not known."""
     error = np.where(np.isfinite(found.error), found.error, np.nan)
     steps = np.maximum(found.used["steps_used"], 1)
     for number, result in enumerate(results):
         if result.name.endswith("_position"):
             least = np.where(found.used["steps_used"] > 0, 1.0 / steps, 0.0)
             error[number] = np.minimum(np.maximum(error[number], least), 1.0)
+        if result.name.endswith("_settling_time"):
+            error[number, np.isnan(found.outcome.numbers[result.name])] = np.nan
     return error
 
 

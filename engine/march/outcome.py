@@ -55,8 +55,9 @@ class Asked:
     @property
     def least_fidelity(self) -> Fidelity:
         """The lowest model that tells these results: statics have no accelerations, and nothing that only motion
-        makes."""
-        if self.accelerated:
+        makes, as dynamic parts and what swings on after a stop."""
+        moving = self.accelerated or self.study.output.residual
+        if moving or any(sensor.is_dynamic_part for sensor in self.study.sensor.values()):
             return Fidelity.FORCE
         return Fidelity.STATIC if self.reduction is None else self.reduction.least_fidelity
 

@@ -3,21 +3,32 @@ settled."""
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from engine.kernels import layout
 from engine.model.lane_table import weights
+from engine.model.scene_model import with_numerics
+from engine.model.station_path import standing
 from engine.observation.histories import counts_at_rest
+from engine.observation.signals import build_sensors
+from engine.statics.coupled_modes import coupled_modes
 from results_schema.arrays import Array, Counts
 
 if TYPE_CHECKING:
     from engine.march.march import Marched
     from engine.march.tables import SceneTables
+    from engine.model.scene_model import SceneModel
     from engine.scene.study import Study
     from engine.scene.variants import VariantValues
 
+STILL = 1e-9  # of its band: what a sensor is off where nothing swings is rounding
+BEATS = 2.0  # that it takes to see that a sensor has settled: after one the next was 1 % higher
+LOWEST, FEW = 4, 8  # modes of the scene whose periods and beats count, and of each body that tell them
+ALIKE = 0.02  # of a frequency: a beat of 50 periods and more is damped before it comes round
+READ = 0.01  # of the reading of the one that a sensor reads most of
 MOST_STATIONS = 4097  # of a rest on which it is looked for when sensors have settled: 16 of each of 256 swings
 
 
@@ -46,8 +57,8 @@ def counts_settling(tables: SceneTables) -> Counts:
 
 def settling_times(tables: SceneTables, values: VariantValues, counts: Counts, history: Array) -> dict[str, Array]:
     """How long after all carriages have come to rest or left a sensor is off its static value by more than its band,
-    s; NaN where it still is within a period before the end, as it may swing out of it again. history (H, J, V) of the
-    sensors at stations by their count."""
+    s; NaN where it still is within a period, or two beats, of the end, as it may swing out of it again. history (H, J,
+    V) of the sensors at stations by their count."""
     own, found = counts_settling(tables), dict[str, Array]()
     if not own.size:
         return found
@@ -55,17 +66,34 @@ def settling_times(tables: SceneTables, values: VariantValues, counts: Counts, h
     for j, (name, static) in enumerate(zip(tables.model.study.sensor, _static(tables, values), strict=True)):
         band = tables.model.study.sensor[name].settling_band
         if band is not None:
-            when = last_beyond(np.abs(readings[:, j] - static), band, seconds - seconds[0])
-            swings_on = (when > 0.0) & (seconds[-1] - seconds[0] - when < _longest_period(tables, name))
+            off = np.abs(readings[:, j] - static)
+            when = last_beyond(off, band, seconds - seconds[0])
+            may_swing = (off > STILL * band).any(axis=0)
+            swings_on = may_swing & (seconds[-1] - seconds[0] - when < _longest_swing(tables, values, j))
             found[f"{name}_settling_time"] = np.where(swings_on, np.nan, when)
     return found
 
 
-def _longest_period(tables: SceneTables, sensor: str) -> float:
-    """s, of the modes of the body of a sensor; 0 where it does not bend."""
-    body = tables.model.study.body_of(sensor)
-    omega = next(part.modal.omega for part in tables.model.bodies if part.name == body)
-    return float(2.0 * np.pi / omega[omega > 0.0].min()) if (omega > 0.0).any() else 0.0
+def _longest_swing(tables: SceneTables, values: VariantValues, sensor: int) -> Array:
+    """(V,) s: the longest period of what a sensor reads of the lowest modes of the scene with its carriages where they
+    rest, or of two beats of neighbours among these; 0 where it reads none."""
+    model, along = _of_few_modes(tables.model), standing(tables.timeline, tables.at_rest)
+    omega, shapes = coupled_modes(model, values, along, LOWEST)
+    row = build_sensors(model)[sensor].reads_whole.loose(model, along)[-1]
+    read = np.abs(np.einsum("n,vnk->vk", row, np.nan_to_num(shapes[:, 0])))
+    own = np.where(read > READ * read.max(axis=1, keepdims=True), omega[:, 0], np.nan)
+    ordered = np.sort(own, axis=1)  # NaN at the end
+    beats = np.diff(ordered, axis=1)
+    slowest = np.concatenate([own, np.where(beats > ALIKE * ordered[:, 1:], beats / BEATS, np.nan)], axis=1)
+    return np.asarray(2.0 * np.pi / np.fmin.reduce(slowest, axis=1, initial=np.inf))
+
+
+@lru_cache(maxsize=32)
+def _of_few_modes(model: SceneModel) -> SceneModel:
+    """The same scene with few modes, and with all the masses that the study gives it."""
+    own, wanted = model.numerics, model.study.solver.fidelity
+    few = own._replace(modes=min(own.modes, FEW), fidelity=wanted, static_correction=True)
+    return with_numerics(model, few)
 
 
 def last_beyond(off: Array, band: float, seconds: Array) -> Array:

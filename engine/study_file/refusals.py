@@ -119,7 +119,8 @@ def bad_input(detail: Any, model: type[Spec], data: Any, source: Source) -> BadI
     context = detail.get("ctx", {})
     if detail["type"] == "wanderlast":
         said = {key: context[key] for key in ("expected", "received")}
-        return BadInput(context["what"], where=where, **said, remedy=context["remedy"] or _misplaced(model, data, keys))
+        remedy = context["remedy"] or _misnamed(data, keys) or _misplaced(model, data, keys)
+        return BadInput(context["what"], where=where, **said, remedy=remedy)
     if detail["type"] == "extra_forbidden":
         names = keys_at(model, data, keys[:-1])
         looked_for = _looked_for(model, data, keys)
@@ -140,6 +141,15 @@ def bad_input(detail: Any, model: type[Spec], data: Any, source: Source) -> BadI
     remedy = place.hint if place and bound else nearest(detail["input"], [str(word) for word in words])
     remedy = remedy or _misplaced(model, data, keys)
     return BadInput(_what(detail), where=where, expected=expected or detail["msg"], received=received, remedy=remedy)
+
+
+def _misnamed(data: Any, keys: Keys) -> str:
+    """A hint at the table that was meant, of one without a kind beside another whose name is nearly the same, or ""."""
+    if len(keys) < 2 or keys[-1] != "kind":
+        return ""
+    around = value_at(data, keys[:-2])
+    others = [str(name) for name in around if name != keys[-2]] if isinstance(around, dict) else []
+    return nearest(keys[-2], others)
 
 
 def _too_few(model: type[Spec], data: Any, keys: Keys, source: Source) -> BadInput:

@@ -71,7 +71,7 @@ class Passage(Kind):
         told, (envelopes, sensors) = (_largest, _amplified, _limited, _uplift), _told(results)
         said = [told_along(results, name) for name in envelopes]
         said += [
-            f"{sensor}: it reads nothing but rounding."
+            _nothing(results, sensor)
             if only_rounding(results, sensor)
             else "".join(tell(results, sensor) for tell in told)
             for sensor in sensors
@@ -103,6 +103,16 @@ def _told(results: Results) -> tuple[list[str], list[str]]:
     limits, envelopes = question_of(results.study, AskedOfPassages), beyond_sensors(results)
     told = {results.study.envelope[name].quantity for name in envelopes}
     return envelopes, ranked(results, limits, told)[:MOST_SENSORS]
+
+
+def _nothing(results: Results, sensor: str) -> str:
+    """Of a sensor that reads nothing, why."""
+    if not results.study.sensor[sensor].is_dynamic_part:
+        return f"{sensor}: it reads nothing but rounding."
+    if results.study.solver.fidelity == "static":
+        return f"{sensor}: statics have no dynamic part."
+    off = float(np.nanmax(errors_of_size(results, sensor), initial=0.0))
+    return f"{sensor}: statics hold the tolerance: the dynamic part is 0 ± {quantity(off, results.sensors[sensor], 2)}."
 
 
 def _extremes(results: Results, sensor: str) -> tuple[Index | None, Index | None]:
@@ -156,7 +166,8 @@ def _amplified(results: Results, sensor: str) -> str:
     """Where statics are exceeded by as much as the question names; "" without anything to compare."""
     gain, study = results.numbers("dynamic_amplification", sensor), results.study
     known = np.isfinite(np.where(results.with_values, gain, np.nan)).any()
-    if study.sensor[sensor].is_dynamic_part or results.size < 2 or not known:
+    says_nothing = study.sensor[sensor].is_dynamic_part or study.solver.fidelity == "static"
+    if says_nothing or results.size < 2 or not known:
         return ""
     threshold = question_of(results.study, AskedOfPassages).amplification
     where = where_beyond(results, gain, threshold, results.axis(*PACES))
@@ -216,7 +227,8 @@ def _uplift(results: Results, sensor: str) -> str:
     if place is None or least[place] >= -ROUNDING * sizes(results, sensor)[place]:
         return ""
     weight = "" if results.study.body[results.study.body_of(sensor)].own_weight else ", own weight not counted"
-    return f" It pulls by up to {quantity(-float(least[place]), 'N')}{in_words(results, place)}{weight}."
+    where = "" if unchanged(results, least) else in_words(results, place)
+    return f" It pulls by up to {quantity(-float(least[place]), 'N')}{where}{weight}."
 
 
 def _with_remark(said: list[str], remark: str) -> list[str]:

@@ -17,6 +17,7 @@ from results_schema.errors import BadInput, Remark
 from results_schema.lazy_imports import xr
 from results_schema.registry import ABSENT, Pieces, lacks, no_row_of
 from results_schema.validate import validate
+from studies.protocol.checksum import VALUES, checksum_of_values
 from studies.protocol.parts import Foreseen, Memory, TextTable, Variants, Work
 
 if TYPE_CHECKING:
@@ -289,7 +290,8 @@ def run(study: Study | str | Path, **options: Any) -> xr.Dataset:
     with place(**where) as here:
         parts.compute(store, Work(place=here, **options))
     found = compared(parts.gather(store), study)
-    return found.assign_attrs(run_seconds=round(time.perf_counter() - started, 3))
+    seconds = round(time.perf_counter() - started, 3)
+    return found.assign_attrs({"run_seconds": seconds, VALUES: checksum_of_values(found)})
 
 
 def compared(dataset: xr.Dataset, study: Study) -> xr.Dataset:

@@ -18,6 +18,7 @@ from studies.results.formatting import counted, listed, percent, scientific, tim
 from studies.results.results import Results
 from studies.runs.not_audited import told_none, told_none_briefly
 
+FIXED = "what a study fixes itself, as its model, modes, steps or elements, is told and does not change the status"
 LARGE = 0.02  # an estimated error that people should know of where nothing holds it: what figures hardly show
 
 
@@ -130,9 +131,7 @@ def _held_accuracy(group: xr.Dataset | None, results: Results) -> str:
     if estimates.size and tolerances.min() < tolerances.max() and results.each_within_tolerance(fine):
         said = f"{found}, each within its own tolerance ({_span(tolerances)})"
     elif estimates.size and estimates.max() > tolerances.max():
-        said = (
-            f"{said} (what a study fixes itself, as modes, steps or elements, is told and does not change the status)"
-        )
+        said = f"{said} ({FIXED})"
     return f"{said}; {told_none_briefly(results) if group is None else _compared(group, results)}"
 
 

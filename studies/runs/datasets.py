@@ -10,6 +10,7 @@ from results_schema.errors import BadInput, shortened
 from results_schema.lazy_imports import xr
 from results_schema.store import files
 from results_schema.store.archive import Archive, write_archive
+from studies.protocol.checksum import VALUES, checksum_of_values
 from studies.protocol.study import kind_of
 from studies.results.results import Results
 from studies.runs.archived import findings, with_first_frequency
@@ -30,6 +31,7 @@ def archive_of(dataset: xr.Dataset, path: Path | str, study: Study | None = None
     key = run_key(results.study, kind_of(results.study).parts(results.study).names)
     seconds = float(dataset.attrs.get("run_seconds", 0.0))
     root = results.dataset.assign_attrs(attributes(results.study, key, seconds))
+    root.attrs.pop(VALUES, None)
     models = model_groups(base_scene(results.study))
     marched = bool(results.study.carriage) and results.study.output.keeps_variants
     return Archive(Path(path), root, with_first_frequency(models, results) if marched else models)
@@ -50,6 +52,9 @@ def write(dataset: xr.Dataset, path: Path | str, study: Study | None = None) -> 
             where="dataset",
             remedy="write what studies.run gives; a dataset of your own goes to a file by its to_netcdf",
         )
+    if dataset.attrs.get(VALUES, checksum_of_values(dataset)) != checksum_of_values(dataset):
+        what, remedy = "values of this dataset were changed", "what is your own goes to a file by its to_netcdf"
+        raise BadInput(what, where="dataset", expected="the numbers that studies.run gave", remedy=remedy)
     write_archive(path, archive.root, archive.groups)
     return path
 

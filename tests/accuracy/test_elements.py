@@ -88,7 +88,7 @@ def test_elements_make_no_status() -> None:
 
 def test_answers_say_so() -> None:
     said = [told_accuracy(None, Results.of(studies.run(bridge(elements)))) for elements in (3, 16)]
-    why = "what a study fixes itself, as modes, steps or elements, is told and does not change the status"
+    why = "what a study fixes itself, as its model, modes, steps or elements, is told and does not change the status"
     assert f"where 1e-3 was asked ({why})" in said[0]
     assert "where 1e-3 was asked;" in said[1]
 

@@ -14,6 +14,7 @@ from studies.pictures.common.figures import Figure
 from studies.reporting import answers
 from studies.results.formatting import percent
 from studies.results.results import Results
+from tests.engine.build import beam, force, study
 from tests.pictures.test_passages import MASS, limits, panels
 from tests.studies import scenes
 
@@ -143,6 +144,14 @@ def test_grey_is_explained_where_something_has_left() -> None:
     text = scenes.text_of("passage", scenes.pace("passage")).replace("speed = 8.0", "speed = 8.0\nafter = 1.0")
     leaves, stays = drawn(studies.run(text))["response"], drawn(swayed())["response"]
     assert "Grey: table has left" in leaves.caption and "rey" not in stays.caption
+
+
+def test_nothing_is_grey_where_variants_stop_at_different_places() -> None:
+    """The trolley of the answer's variant stopped at 12 m, and 12 to 18 m were grey, as if it had left there."""
+    move = {"kind": "point-to-point", "start": 0.2, "end": 0.8, "speed": 1.0, "acceleration": 4.0, "dwell": 1.0}
+    ends = {"end": {"of": "carriage.car.motion.end", "values": [0.6, 0.9]}}
+    found = studies.run(study(beam(damping_ratio=0.1), force(1.0, move), sweep=ends))
+    assert "Grey" not in drawn(found)["response"].caption
 
 
 def test_odd_parts_of_variants_that_have_not_settled_are_dashed_and_not_in_the_title() -> None:

@@ -38,6 +38,15 @@ def test_what_info_would_refuse_is_refused_before_it_is_written(tmp_path: Path) 
     assert not path.exists()
 
 
+def test_changed_numbers_are_not_written_as_those_of_the_study(tmp_path: Path) -> None:
+    """A deflection in mm was archived as if the run had found it, and `info` said "whole"."""
+    found = scenes.run("passage", PASSAGES)
+    changed, path = found.assign(midspan_max=1e3 * found.midspan_max), tmp_path / "mine.nc"
+    assert "values of this dataset were changed" in refused(studies.write, changed, path) and not path.exists()
+    with xr.open_dataset(studies.write(found, path)) as again:
+        assert "values_crc32" not in again.attrs and again.midspan_max.equals(found.midspan_max)
+
+
 def test_datasets_that_went_through_files(tmp_path: Path) -> None:
     """xarray gives coordinates a fill value of its own when it writes them."""
     scenes.run("passage", PASSAGES).to_netcdf(tmp_path / "kept.nc")

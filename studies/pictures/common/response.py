@@ -107,7 +107,8 @@ def _shade_left(axes: Axes, results: Results, index: Index, end: float) -> None:
     for the slow are soon still."""
     first = results.trace(f"{results.carriage_name}_position", index)
     on = np.flatnonzero(np.isfinite(first.values))
-    if on.size < 2 or first.values[on[-1]] <= first.values[on[0]]:
+    stays = on.size == first.values.size
+    if on.size < 2 or stays or first.values[on[-1]] <= first.values[on[0]]:
         return
     start, left = first.values[on[0]], first.values[on[-1]]
     speed = (left - first.values[on[-2]]) / (first.times[on[-1]] - first.times[on[-2]])
