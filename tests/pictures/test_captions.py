@@ -150,7 +150,7 @@ def test_nothing_is_grey_where_variants_stop_at_different_places() -> None:
     """The trolley of the answer's variant stopped at 12 m, and 12 to 18 m were grey, as if it had left there."""
     move = {"kind": "point-to-point", "start": 0.2, "end": 0.8, "speed": 1.0, "acceleration": 4.0, "dwell": 1.0}
     ends = {"end": {"of": "carriage.car.motion.end", "values": [0.6, 0.9]}}
-    found = studies.run(study(beam(damping_ratio=0.1), force(1.0, move), sweep=ends))
+    found = studies.run(study(beam(damping_ratio=0.1), force(1.0, move), sweep=ends, output={"histories": "all"}))
     assert "Grey" not in drawn(found)["response"].caption
 
 

@@ -107,9 +107,8 @@ def _shade_left(axes: Axes, results: Results, index: Index, end: float) -> None:
     for the slow are soon still."""
     first = results.trace(f"{results.carriage_name}_position", index)
     on = np.flatnonzero(np.isfinite(first.values))
-    stays = on.size == first.values.size
-    if on.size < 2 or stays or first.values[on[-1]] <= first.values[on[0]]:
-        return
+    if on.size < 2 or first.values[on[-1]] <= first.values[on[0]] or first.values[on[-1]] == first.values[on[-2]]:
+        return  # it came back, or stands where it stopped
     start, left = first.values[on[0]], first.values[on[-1]]
     speed = (left - first.values[on[-2]]) / (first.times[on[-1]] - first.times[on[-2]])
     last = max(_last_time(results, carriage, index) for carriage in results.study.carriage)
