@@ -93,8 +93,8 @@ def place(threads: int | None = None, workers: int = 0, scheduler: str | None = 
 
 def check_place(threads: int | None = None, workers: int = 0, scheduler: str | None = None) -> None:
     """Refuse what cannot be. Raises BadInput."""
-    if threads is not None and threads < 1:
-        raise BadInput("no threads to run on", where="threads", expected=">= 1", received=str(threads))
+    if threads is not None and not (isinstance(threads, int) and threads >= 1):
+        raise BadInput("no threads to run on", where="threads", expected="a whole number >= 1", received=repr(threads))
     if workers < 0:
         raise BadInput("no number of processes", where="workers", expected=">= 0", received=str(workers))
     if scheduler is not None and (workers or threads):

@@ -37,7 +37,9 @@ def _taken(dataset: xr.Dataset) -> xr.Dataset:
             where="dataset",
             expected="a dataset of studies.run, with its attributes",
             received=f"a dataset of {shortened(list(dataset.variables))}" if known else f"a {type(dataset).__name__}",
-            remedy="studies.run(study) in place of engine.run(study), whose dataset is of the march alone",
+            remedy="studies.run(study) in place of engine.run(study), whose dataset is of the march alone"
+            if known
+            else "xarray.open_dataset(...) of an archive, or what studies.run gives",
         )
     found = dataset.copy()
     for name in found.coords:

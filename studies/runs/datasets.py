@@ -15,6 +15,7 @@ from studies.protocol.study import kind_of
 from studies.results.results import Results
 from studies.runs.archived import findings, with_first_frequency
 from studies.runs.identity import run_key
+from studies.runs.not_audited import PYTHON, WHY
 from studies.runs.provenance import attributes
 
 
@@ -30,10 +31,11 @@ def archive_of(dataset: xr.Dataset, path: Path | str, study: Study | None = None
     _check_own(results)
     key = run_key(results.study, kind_of(results.study).parts(results.study).names)
     seconds = float(dataset.attrs.get("run_seconds", 0.0))
-    root = results.dataset.assign_attrs(attributes(results.study, key, seconds))
+    marched = bool(results.study.carriage) and results.study.output.keeps_variants
+    why = {WHY: dataset.attrs.get(WHY, PYTHON)} if results.study.solver.audit != 0 and marched else {}
+    root = results.dataset.assign_attrs({**attributes(results.study, key, seconds), **why})
     root.attrs.pop(VALUES, None)
     models = model_groups(base_scene(results.study))
-    marched = bool(results.study.carriage) and results.study.output.keeps_variants
     return Archive(Path(path), root, with_first_frequency(models, results) if marched else models)
 
 

@@ -10,9 +10,10 @@ if TYPE_CHECKING:
     from studies.results.results import Results
 
 WHY = "not_audited"  # the attribute; archives without it leave the reason open
-TOO_LONG, NOTHING_FINER, CHOSE = "too long", "nothing finer", "chose models"
+TOO_LONG, NOTHING_FINER, CHOSE, PYTHON = "too long", "nothing finer", "chose models", "run from Python"
 _LONG = "it would have taken too long"
 _FINER = "nothing finer than what variants were computed with is left to compare them with"
+_PYTHON = "studies.run audits none; the command run does"
 _CHOSE = "models were chosen by all of them, each beside a finer one"
 REASONS = f"{_LONG} (audit = 20, say, audits 20 variants all the same), or {_FINER}"
 NONE_AUDITED = f"no variant was audited: {REASONS}"
@@ -64,7 +65,7 @@ def told_none_briefly(results: Results) -> str:
 
 def _known(results: Results) -> str:
     """The reason in words where the archive has it and all variants have values, else ""."""
-    told = {TOO_LONG: f"{_LONG} ({_all_the_same(results)})", NOTHING_FINER: _FINER, CHOSE: _CHOSE}
+    told = {TOO_LONG: f"{_LONG} ({_all_the_same(results)})", NOTHING_FINER: _FINER, CHOSE: _CHOSE, PYTHON: _PYTHON}
     return told.get(str(results.dataset.attrs.get(WHY, "")), "")
 
 

@@ -10,6 +10,9 @@ import engine
 import studies
 from results_schema.errors import BadInput
 from studies.commands.cli import main
+from studies.runs.archived import results_of
+from studies.runs.datasets import archive_of
+from studies.runs.not_audited import told_none_briefly
 from tests.studies import scenes
 
 PASSAGES = scenes.pace("passage")
@@ -70,3 +73,15 @@ def test_what_is_no_dataset_of_a_study(tmp_path: Path) -> None:
     ):
         assert "expected a dataset of studies.run" in said and "in place of engine.run" in said
     assert "received a DataArray" in refused(studies.answer, scenes.run("passage").midspan_max)
+
+
+def test_what_python_runs_is_not_audited_and_says_so(tmp_path: Path) -> None:
+    """That it "would have taken too long" was told of runs that audit nothing."""
+    found = scenes.run("passage", PASSAGES)
+    told = told_none_briefly(results_of(archive_of(found, tmp_path / "a.nc")))
+    assert told == "no variant was audited, as studies.run audits none; the command run does."
+    assert "xarray.open_dataset" in refused(studies.answer, "m.nc") and "engine.run" not in refused(
+        studies.answer, "m.nc"
+    )
+    with pytest.raises(BadInput, match="threads: no threads to run on"):
+        studies.run(scenes.study("passage"), threads="2")

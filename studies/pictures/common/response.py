@@ -23,7 +23,7 @@ from studies.pictures.common.figures import (
 )
 from studies.pictures.common.traces import over_way
 from studies.results.findings_common import LOOSE, told_hanging
-from studies.results.formatting import percent, quantity, scale_for
+from studies.results.formatting import counted, percent, quantity, scale_for
 from studies.results.places import Index
 from studies.results.results import Results
 
@@ -49,6 +49,7 @@ def response(results: Results, ranked: list[str], limits: Limits, shown: list[In
         + f"Over the way of {results.carriage_name}."
         + (f" {hang}" if (hang := told_hanging(results, sensors)) else "")
         + "".join(loose)
+        + (f" {counted(fewer, 'more sensor')} in the archive." if (fewer := len(ranked) - len(sensors)) else "")
     )
     height = 0.8 + 1.9 * len(sensors)
     figure = draw("response", title, caption, height, partial(_draw, results, sensors, limits, shown))
