@@ -54,25 +54,29 @@ def by_effect(results: Results, values: Array) -> list[Axis]:
     return sorted(varied, key=lambda axis: -float(ranges[axis.name].fillna(0.0).mean()))
 
 
-def told_effects(results: Results, values: Array, what: str) -> str:
+def told_effects(results: Results, values: Array, what: str, error: Array | float = 0.0) -> str:
     """How the largest of positive values (in the sweep's shape) over all other swept numbers changes along each; ""
-    without several numbers on a grid, or where any variant does not count: what is largest is not known then."""
+    without several numbers on a grid, or where any variant does not count: what is largest is not known then. error: of
+    the values, within which a change may be none."""
     axes = [axis for axis in results.axes if len(axis.values) > 1]
     known = np.where(results.with_values, values, np.nan)
     if not 2 <= len(axes) <= MOST_AXES or VARIANT in results.dims or not np.isfinite(known).all():
         return ""
-    worst = {axis: _worst(results, axis, known) for axis in axes}
-    told = [_effect(axis, line) for axis, line in worst.items() if (line > 0.0).all()]
+    doubt = np.broadcast_to(np.nan_to_num(error), known.shape)
+    lines = {axis: _worst(results, axis, known, doubt) for axis in axes}
+    told = [_effect(axis, *line) for axis, line in lines.items() if (line[0] > 0.0).all()]
     return f"Over all else that is swept, {what} {listed(told)}." if told else ""
 
 
-def _worst(results: Results, axis: Axis, values: Array) -> Array:
-    """The largest of values for every value of an axis, ascending."""
-    others = tuple(place for place, dim in enumerate(results.dims) if dim != axis.dim)
-    return np.asarray(values.max(axis=others)[np.argsort(axis.values)])
+def _worst(results: Results, axis: Axis, values: Array, error: Array) -> tuple[Array, Array]:
+    """The largest of values for every value of an axis, ascending, and their errors."""
+    place, rows = results.dims.index(axis.dim), np.argsort(axis.values)
+    flat, off = (np.moveaxis(one, place, 0).reshape(rows.size, -1)[rows] for one in (values, error))
+    top = np.argmax(flat, axis=1)[:, None]
+    return np.take_along_axis(flat, top, axis=1)[:, 0], np.take_along_axis(off, top, axis=1)[:, 0]
 
 
-def _effect(axis: Axis, line: Array) -> str:
+def _effect(axis: Axis, line: Array, error: Array | None = None) -> str:
     """What a swept number does, in words.
 
     >>> speed = Axis("speed", "speed", {}, np.array([1.0, 2.0, 4.0]), "m s-1")
@@ -86,6 +90,8 @@ def _effect(axis: Axis, line: Array) -> str:
     ('falls by 36 % over speed 1 m/s to 4 m/s', 'falls to 1/2.5 over speed 1 m/s to 4 m/s')
     >>> _effect(speed, np.array([1.0, 1.0004, 1.0003]))
     'hardly changes over speed 1 m/s to 4 m/s'
+    >>> _effect(speed, np.array([1.0, 1.3, 1.2]), np.array([0.2, 0.2, 0.1]))
+    'changes within its estimated error over speed 1 m/s to 4 m/s'
     """
     over, ratio = f"over {axis.noun} {axis.span}", float(line.max() / line.min())
     steps = np.diff(line)
@@ -93,6 +99,8 @@ def _effect(axis: Axis, line: Array) -> str:
         return f"stays the same {over}"
     if ratio - 1.0 <= HARDLY:
         return f"hardly changes {over}"
+    if error is not None and line.max() - line.min() <= error[np.argmax(line)] + error[np.argmin(line)]:
+        return f"changes within its estimated error {over}"
     if (steps >= 0.0).all():
         return f"grows {'' if ratio >= TIMES else 'by '}{_times(ratio)} {over}"
     if (steps <= 0.0).all():

@@ -148,6 +148,7 @@ def _largest(results: Results, sensor: str) -> str:
 
 def _effects(results: Results, envelopes: list[str], sensors: list[str]) -> str:
     """What every swept number does to what the answer begins with, where there are several; "" else."""
+    error: Array | float = 0.0
     if envelopes:
         name = envelopes[0]
         what, values = (
@@ -155,10 +156,14 @@ def _effects(results: Results, envelopes: list[str], sensors: list[str]) -> str:
             sizes_along(results, name),
         )
     else:
-        what, values = results.noun(sensors[0]), sizes(results, sensors[0])
+        what, values, error = (
+            results.noun(sensors[0]),
+            sizes(results, sensors[0]),
+            errors_of_size(results, sensors[0]),
+        )
         if hardly_changed(results, values, partial(quantity, units=results.sensors[sensors[0]])):
             return ""
-    said = told_effects(results, values, f"the largest {what}")
+    said = told_effects(results, values, f"the largest {what}", error)
     return f" {said}" if said else ""
 
 

@@ -44,6 +44,16 @@ def test_the_largest_over_all_others_counts() -> None:
     assert "changes by up to 25 % over mass" in told_effects(results, values, "it")
 
 
+def test_what_may_be_an_error_is_no_effect() -> None:
+    """ "Changes by up to 41 % over rope stiffness" was told of 62 +- 7, 51 +- 12 and 72 +- 8 um."""
+    results = Results.of(scenes.run("passage", f"{scenes.pace('passage')}\n{MASS}"))
+    values, error = np.ones((4, 3)), np.full((4, 3), 0.1)
+    values[3] = 2.0, 2.3, 2.15
+    said = told_effects(results, values, "it", 1.6 * error)
+    assert "grows 2.3 times over pace" in said and "changes within its estimated error over mass" in said
+    assert "falls by 13 % over mass" in told_effects(results, values, "it", error)
+
+
 @pytest.mark.parametrize("place", range(12))
 def test_where_a_contact_opens_what_is_largest_is_not_known(place: int) -> None:
     dataset, values = scenes.run("passage", f"{scenes.pace('passage')}\n{MASS}"), np.arange(1.0, 13.0).reshape(4, 3)
