@@ -23,6 +23,7 @@ MOST_PARTS = 8  # of a sweep that are told one by one
 MOST_APART = 3  # of them that are told each with what else is swept
 MOST_TOLD = 3  # values of another swept number that are told one by one
 GAP = 3.0  # times the usual distance of two values of a sweep
+NEARLY = 0.9  # of a limit that is exceeded nowhere: between swept values it may well be
 LIMIT = " Its absolute value exceeds "
 LIMITED = (
     *("displacement", "velocity", "acceleration", "bending_moment", "stress", "support_reaction"),
@@ -80,7 +81,9 @@ def told_limit(
     loose = np.where(error > LOOSE * values, error, 0.0)
     surely, perhaps = (where_beyond(results, values + sign * loose, limit, along) for sign in (-1.0, 1.0))
     doubt = "" if surely == said == perhaps else f"; with its estimated error perhaps {perhaps}, surely {surely}"
-    return f"{LIMIT}{quantity(limit, units)} {said}{doubt}{_told_opened(results, values > limit)}."
+    top = float(np.nanmax(np.where(results.with_values, values, np.nan), initial=0.0))
+    near = f"; at most it is {quantity(top, units)}" if said.startswith("nowhere") and top > NEARLY * limit else ""
+    return f"{LIMIT}{quantity(limit, units)} {said}{near}{doubt}{_told_opened(results, values > limit)}."
 
 
 def _told_opened(results: Results, beyond: Mask) -> str:

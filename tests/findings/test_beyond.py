@@ -82,6 +82,13 @@ def test_quantities_with_a_limit_come_first_and_then_their_other_sensors() -> No
     assert subjects(dataset) == ["hogging", "aboard", "shaken_most", "quarter", "shaken", "moment"]
 
 
+def test_what_comes_near_its_limit_is_told_with_its_largest_value() -> None:
+    """3.487 m/s2 at 101 speeds exceeded 3.5 "nowhere", and 3.502 between two of them."""
+    near, far = (" ".join(answers.answer(passage(f"[question]\nacceleration = {limit}"))) for limit in (6.05, 20.0))
+    assert "Its absolute value exceeds 6.05 m/s² nowhere from 1 m/s to 8 m/s; at most it is 6 m/s²." in near
+    assert "exceeds 20 m/s² nowhere from 1 m/s to 8 m/s." in far
+
+
 def test_titles_name_the_largest_of_their_quantity() -> None:
     titles = {figure.name: figure.title for figure in answers.figures(passage())}
     assert titles["largest-displacement"].startswith("The largest displacement at 2.5 m of bed is 3 mm, at pace")
