@@ -187,14 +187,17 @@ def _bodies(base: SceneModel) -> TextTable:
         rates = values.damping_rates(part.name, omega)[:, 0]
         elastic = omega > 0.0
         ratios = rates[elastic] / (2.0 * omega[elastic])
-        shown = ", ".join(number(f) for f in omega[:FREQUENCIES_SHOWN] / (2.0 * np.pi))
+        pushed = base.excited(part)[:FREQUENCIES_SHOWN]
+        frequencies = omega[:FREQUENCIES_SHOWN] / (2.0 * np.pi)
+        shown = ", ".join(number(f) if own else f"({number(f)})" for f, own in zip(frequencies, pushed, strict=True))
         more = " ..." if omega.size > FREQUENCIES_SHOWN else ""
         if not elastic.any():
             rows.append((part.name, f"{number(part.modal.mass, 5)} kg", "rigid", "does not bend", "none"))
             continue
         damping = f"{spanned(ratios)}{' without its dampers' * has_dampers(base.study, part.name)}"
         rows.append((part.name, f"{number(part.modal.mass, 5)} kg", str(omega.size), shown + more, damping))
-    return TextTable("Bodies", ("body", "mass", "modes", "frequencies (Hz)", "damping ratio"), rows)
+    aside = " (in brackets: loads on the track do not move these modes)" if any("(" in row[3] for row in rows) else ""
+    return TextTable(f"Bodies{aside}", ("body", "mass", "modes", "frequencies (Hz)", "damping ratio"), rows)
 
 
 def _tracks(base: SceneModel) -> TextTable:

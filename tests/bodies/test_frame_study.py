@@ -192,6 +192,17 @@ def test_a_key_of_another_kind_of_body_is_told_as_that() -> None:
         load(write_document(STUDY | {"body": {"bridge": UNIFORM | {"node": {"a": [0.0, 0.0, 0.0]}}}}))
 
 
+def test_modes_that_loads_do_not_move_stand_in_brackets() -> None:
+    """An axial mode, by an area that was made up, was taken for the third bending frequency of a bridge."""
+    rail = straight({"a": ["x", "z"], "b": ["z"]}, plane="xz", section={"area": 2e-4})
+    given = load(write_document(STUDY | {"body": {"bridge": rail}, "sweep": {}}))
+    tables = preview(kind_of(given).parts(given), 1).tables
+    table = next(one for one in tables if one.title.startswith("Bodies"))
+    assert table.title == "Bodies (in brackets: loads on the track do not move these modes)"
+    frequencies = table.rows[0][3]
+    assert 1 <= frequencies.count("(") < 6 and not frequencies.startswith("(")
+
+
 def test_unconnected_frames_are_refused() -> None:
     body = write_copy(BRIDGE)
     body["node"] |= {"e": [0.0, 5.0, 0.0], "f": [4.0, 5.0, 0.0]}
