@@ -88,7 +88,7 @@ def _check_sensor(study: Study, name: str, sensor: Sensor) -> None:
     _check_quantity(study, here, body, sensor.quantity)
     if sensor.settling_band is not None and not study.output.residual:
         what, expected = "how long a sensor takes to settle is told of residual vibrations", "[output] residual = true"
-        raise study.source.fault(f"{here}.settling_band", what, expected=f"{expected} beside it")
+        raise study.source.fault(f"{here}.settling_band", what, expected=f"{expected} beside it, or no settling_band")
     if sensor.spot is not None:
         with _within(study, here):
             study.body[body].check_spot(sensor.spot)

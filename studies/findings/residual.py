@@ -59,10 +59,10 @@ def ringing(results: Results, limits: Limits) -> list[str]:
     if not results.study.output.residual:
         return []
     size = {name: np.nanmax(residual_of(results, name), initial=0.0) for name in results.sensors}
-    return [name for name in in_turns(results, limits, size) if not _has_whole(results, name)]
+    return [name for name in in_turns(results, limits, size) if not has_whole(results, name)]
 
 
-def _has_whole(results: Results, name: str) -> bool:
+def has_whole(results: Results, name: str) -> bool:
     """Whether a sensor reads the dynamic part of what another one reads."""
     known = results.study.sensor
     same = [other for other in known if known[other].quantity == known[name].quantity and other != name]

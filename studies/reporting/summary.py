@@ -16,6 +16,7 @@ from studies.at_rest.errors import errors_along
 from studies.findings.absolute_errors import absolute_errors, told_error
 from studies.findings.amplification import sizes
 from studies.findings.numerics_used import ERROR, WORK, is_marched
+from studies.findings.residual import has_whole
 from studies.protocol.study import kind_named
 from studies.results.axes import VARIANT
 from studies.results.cells import End, cell_ranges, counts_of, single_numbers, words_of
@@ -232,8 +233,10 @@ def _limited(results: Results) -> list[str]:
 
 
 def in_tables(study_results: Results) -> list[Range]:
-    """The same, but of the axles of a train those alone whose contact forces are the largest and the smallest."""
-    found = asked(study_results)
+    """The same, but of the axles of a train those alone whose contact forces are the largest and the smallest, and of
+    a dynamic part beside its whole no residual vibration, which is the same."""
+    alike = {f"{name}_residual" for name in study_results.sensors if has_whole(study_results, name)}
+    found = [one for one in asked(study_results) if one.name not in alike]
     for name, train in study_results.study.train.items():
         for end, sign in (("max", 1.0), ("min", -1.0)):
             names = {f"{axle_name(name, axle)}_contact_force_{end}" for axle in range(train.count)}

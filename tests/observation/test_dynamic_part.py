@@ -12,6 +12,8 @@ from engine.march.outcome import used
 from engine.scene.study import Study
 from engine.unreduced.comparison import Compared, compare_variant
 from results_schema.errors import BadInput
+from studies.reporting import summary
+from studies.results.results import Results
 from tests.engine.build import Table, beam, cruise, fixed, force, mass, study, study_of_steps, under
 from tests.unreduced.test_unreduced import ABOARD, SPRINGS, TABLE_SECTION, frame, scene, with_table
 
@@ -140,6 +142,8 @@ def test_what_swings_on_is_told_of_the_whole_alone() -> None:
     told = " ".join(studies.answer(found))
     assert found.place_part_residual.values == pytest.approx(found.place_residual.values, rel=1e-2)
     assert "place: at rest it still swings" in told and "place_part: at rest" not in told
+    named = [one.name for one in summary.in_tables(Results.of(found))]
+    assert "place_residual" in named and "place_part_residual" not in named
     assert "Its absolute value exceeds 3 mm from 4 m/s² to the end of the sweep, 16 m/s²." in told
     alone = studies.run(stop.with_values({"sensor": {"part": fixed(0.5) | {"part": "dynamic"}}}))
     assert "part: at rest it still swings" in " ".join(studies.answer(alone))
