@@ -114,7 +114,8 @@ def _shapes(results: Results) -> Figure:
     where = "at the beginning, in the middle and at the end of its way" if several else "where it stands"
     caption = (
         f"The lowest {count} shapes with the carriage {where}, each "
-        "scaled to its own largest motion. Grey: at rest."
+        "scaled to its own largest motion along the loads, which alone is drawn: what sways beside them does not show. "
+        "Grey: at rest."
         + (" What rides is drawn above what it rides." if any(c.riding_body for c in carriages) else "")
     )
     height = 0.4 + 1.35 * count
