@@ -81,7 +81,7 @@ class Beyond(NamedTuple):
     dear: float
 
 
-SECOND = 2  # level: the first at which two changes are known
+FIRST_PAIR = 2  # the first level at which two changes are known
 NO_FURTHER, IN_TURN = Beyond(0, DEAR), InTurn()
 
 
@@ -180,8 +180,8 @@ def converge(
         apart = differences(asked, model, own, found.outcome.of(active), now)
         remaining = left_over(apart, change[:, active])
         if pushes_along:
-            twice, kept = (EARLY, EARLY_STAYS * stays) if level == SECOND else (1.0, stays)
-            remaining = np.maximum(remaining, left_along(twice * apart, change[:, active], kept))
+            times, kept = (EARLY, EARLY_STAYS * stays) if level == FIRST_PAIR else (1.0, stays)
+            remaining = np.maximum(remaining, left_along(times * apart, change[:, active], kept))
         found = _updated(found, active, now, spent, remaining)
         change[:, active] = apart
         off = worst_held(remaining, decisive, own.tighter)

@@ -11,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
+from numbers import Integral
 from typing import Any, Protocol, TypedDict, TypeVar
 
 import numpy as np
@@ -93,7 +94,7 @@ def place(threads: int | None = None, workers: int = 0, scheduler: str | None = 
 
 def check_place(threads: int | None = None, workers: int = 0, scheduler: str | None = None) -> None:
     """Refuse what cannot be. Raises BadInput."""
-    if threads is not None and not (isinstance(threads, int) and threads >= 1):
+    if threads is not None and not _counts_threads(threads):
         raise BadInput("no threads to run on", where="threads", expected="a whole number >= 1", received=repr(threads))
     if workers < 0:
         raise BadInput("no number of processes", where="workers", expected=">= 0", received=str(workers))
@@ -104,6 +105,10 @@ def check_place(threads: int | None = None, workers: int = 0, scheduler: str | N
         from engine.batch.addresses import check_address
 
         check_address(scheduler)
+
+
+def _counts_threads(given: object) -> bool:
+    return isinstance(given, Integral) and int(given) >= 1
 
 
 def check_options(given: Iterable[str], *known: str) -> None:

@@ -144,10 +144,13 @@ def bad_input(detail: Any, model: type[Spec], data: Any, source: Source) -> BadI
 
 
 def _misnamed(data: Any, keys: Keys) -> str:
-    """A hint at the table that was meant, of one without a kind beside another whose name is nearly the same, or ""."""
+    """A hint at the table that was meant, where a dotted key with a misspelt name made one with that key alone and no
+    kind; or ""."""
     if len(keys) < 2 or keys[-1] != "kind":
         return ""
-    around = value_at(data, keys[:-2])
+    around, own = value_at(data, keys[:-2]), value_at(data, keys[:-1])
+    if not isinstance(own, dict) or "kind" in own or len(own) != 1:
+        return ""
     others = [str(name) for name in around if name != keys[-2]] if isinstance(around, dict) else []
     return nearest(keys[-2], others)
 

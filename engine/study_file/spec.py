@@ -141,7 +141,8 @@ def one_of(
             return word
         every = (*words, *more)
         known = meant.get(word.lower().replace("_", "-").replace(" ", "-"))
-        remedy = f'did you mean "{known}"?' if known else nearest(word, every) or (ABSENT if more else "")
+        meaning = f'"{known}"' if known in every else known  # what is no word stands as it is written
+        remedy = f"did you mean {meaning}?" if known else nearest(word, every) or (ABSENT if more else "")
         expected = f"one of {', '.join(every)}"
         raise fault("unknown name", expected=expected, received=shortened(word), remedy=remedy)
 

@@ -25,8 +25,9 @@ def reading_errors(results: Results, sensor: str) -> tuple[Array, str]:
     """Error of a sensor (correction, mode_count, checked_position) over its largest reading, and against what."""
     reference, against = _reference(results, sensor)
     size = float(np.nanmax(np.abs(reference), initial=0.0))
-    error = np.abs(results.dataset[f"{sensor}_by_mode_count"].values - reference)
-    error = np.where(np.isnan(reference), 0.0, error)  # under an axle that is off the body
+    found = results.dataset[f"{sensor}_by_mode_count"].values
+    nothing = np.isnan(found) & np.isnan(reference)  # under an axle that is off the body
+    error = np.where(nothing, 0.0, np.abs(found - reference))
     return error / (size if size > 0.0 else 1.0), against
 
 

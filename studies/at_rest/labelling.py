@@ -149,7 +149,7 @@ class Gathering:
             full, reduced = piece[name].values, piece[f"{name}_reduced"].values
             found[f"{name}_unreduced"] = self.declared[f"{name}_unreduced"].holding(full, dims)
             # every frequency by itself; readings change their sign on the way
-            size = np.abs(full) if name == "frequency" else np.full_like(full, np.abs(full).max(initial=0.0))
+            size = np.abs(full) if name == "frequency" else np.full_like(full, np.nanmax(np.abs(full), initial=0.0))
             part = np.divide(reduced - full, size, out=np.zeros_like(full), where=size > 0.0)
             found[f"{name}_difference"] = self.declared[f"{name}_difference"].holding(part, dims)
         return found

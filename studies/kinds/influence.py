@@ -118,7 +118,9 @@ class Influence(AtRestKind):
         ties = [tie.name for tie in full.ties]
         contacts = [name.replace(".", "_") for name in contact_names(model)]
         parts = [sum(forces[:, r] for r, tie in enumerate(ties) if tie == name) for name in contacts]
-        return {**found, "contact_force": np.stack([np.broadcast_to(p, positions.shape) for p in parts], axis=1)}
+        forces = np.stack([np.broadcast_to(part, positions.shape) for part in parts], axis=1)
+        on = _on_bodies(along, [contact.rides(model) for contact in contact_forces(model)])
+        return {**found, "contact_force": np.where(on, forces, np.nan)}
 
     def check_model(self, model: SceneModel) -> None:
         """Refuse a body that nothing holds. Raises BadInput."""

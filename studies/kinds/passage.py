@@ -156,11 +156,8 @@ def _effects(results: Results, envelopes: list[str], sensors: list[str]) -> str:
             sizes_along(results, name),
         )
     else:
-        what, values, error = (
-            results.noun(sensors[0]),
-            sizes(results, sensors[0]),
-            errors_of_size(results, sensors[0]),
-        )
+        what, values = results.noun(sensors[0]), sizes(results, sensors[0])
+        error = errors_of_size(results, sensors[0])
         if hardly_changed(results, values, partial(quantity, units=results.sensors[sensors[0]])):
             return ""
     said = told_effects(results, values, f"the largest {what}", error)

@@ -242,10 +242,8 @@ def check_folder(folder: Path, page: str) -> None:
 def _facts(results: Results, noun: str) -> list[Row]:
     """The run in a line."""
     known = {Status.OK: 0} | results.status_counts
-    counts = [
-        Row(f"{noun}s", f"{results.variants:,}"),
-        *(Row(f"status {label(s)}", f"{n:,}") for s, n in known.items()),
-    ]
+    statuses = [Row(f"status {label(status)}", f"{count:,}") for status, count in known.items()]
+    counts = [Row(f"{noun}s", f"{results.variants:,}"), *statuses]
     return [Row("kind of study", results.study.kind), *(counts if results.size > 1 or _statuses(results) else ())]
 
 

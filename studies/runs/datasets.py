@@ -54,7 +54,7 @@ def write(dataset: xr.Dataset, path: Path | str, study: Study | None = None) -> 
             where="dataset",
             remedy="write what studies.run gives; a dataset of your own goes to a file by its to_netcdf",
         )
-    if dataset.attrs.get(VALUES, checksum_of_values(dataset)) != checksum_of_values(dataset):
+    if VALUES in dataset.attrs and dataset.attrs[VALUES] != checksum_of_values(dataset):
         what, remedy = "values of this dataset were changed", "what is your own goes to a file by its to_netcdf"
         raise BadInput(what, where="dataset", expected="the numbers that studies.run gave", remedy=remedy)
     write_archive(path, archive.root, archive.groups)

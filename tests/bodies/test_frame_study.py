@@ -156,7 +156,7 @@ REFUSED: dict[str, tuple[dict[str, Any], list[str]]] = {
     "spring to itself": ({"spring.brace.to": "a"}, ["spring.brace.to", "another node"]),
     "mode left out": ({"leave_out": [11]}, ["leave_out.0", "modes = 10"]),
     "nothing left": ({"leave_out": [1, 2, 3, 4, 5, 6, 7, 8, 9, 10]}, ["leave_out", "no mode is left"]),
-    "a roller": ({"supports.a": "roller"}, ["supports.a", 'did you mean "["z"]"']),
+    "a roller": ({"supports.a": "roller"}, ["supports.a", 'did you mean ["z"]?']),
     "off the plane": ({"plane": "xz"}, ["off the plane"]),
     "unit": ({"section.deck.area": "2 kg"}, ["section.deck.area", "area"]),
 }

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import xarray as xr
 
@@ -85,3 +86,13 @@ def test_what_python_runs_is_not_audited_and_says_so(tmp_path: Path) -> None:
     )
     with pytest.raises(BadInput, match="threads: no threads to run on"):
         studies.run(scenes.study("passage"), threads="2")
+    assert studies.run(scenes.study("passage"), threads=np.int64(1)).status == 0
+
+
+def test_a_misspelt_name_in_a_dotted_key_gets_a_hint() -> None:
+    """It makes a table of its own, of which the kind was said to be missing; whoever forgets that gets none."""
+    given = scenes.study("passage")
+    said = refused(given.with_values, {"carriage.tabel.motion.speed": 3.0})
+    assert "carriage.tabel.kind: the kind is missing" in said and 'did you mean "table"?' in said
+    second = {"on": "bed", "mass": 1.0, "motion": {"kind": "cruise", "start": 0.0, "end": 1.0, "speed": 1.0}}
+    assert "did you mean" not in refused(given.with_values, {"carriage.table_2": second})

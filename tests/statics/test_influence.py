@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import studies
 from engine.batch.plan import make_plan
 from engine.march.march import march
 from engine.march.step_rules import allow_any_steps
@@ -160,3 +161,35 @@ def test_static_slopes_move_all_contacts() -> None:
         ).influence[:, 0]
         assert abs(right - left) > 1e-7
         assert float(tables.statics.slope_at(counts)[0, 0]) == pytest.approx((right - left) / 2e-4, rel=1e-4)
+
+
+TRAIN = {"on": "bed", "kind": "force", "force": [3.0, 5.0], "spacing": [0.4]}
+BRIDGE = {"supports": "pinned-pinned", "modes": 8}
+READ = {"middle": fixed(0.5), "first": under("train_1")}
+
+
+@pytest.mark.parametrize(("start", "end"), [(0.0, 1.0), (1.0, 0.0)])
+def test_trains_stand_on_their_body_until_the_last_axle_has_left(start: float, end: float) -> None:
+    """They were followed until the first had, and a reaction of 544 kN under 32 axles was told as 365."""
+    away = abs(start - end) + 0.4
+    way = {"kind": "influence", "question": {"positions": 15, "unreduced": 15}, "sensor": READ}
+    train = {"train": {"train": TRAIN | {"motion": cruise(start, end, 1.0)}}, "carriage": {}}
+    found = studies.run(study(beam(**BRIDGE), {}, **way, **train))
+    alone = study(beam(**BRIDGE), force(1.0, cruise(0.0, 1.0, 1.0)), kind="influence", question={"positions": 101})
+    line = studies.run(alone.with_values({"sensor": {"middle": fixed(0.5)}})).middle
+    first = found.position.values
+    assert np.ptp(first) == pytest.approx(away)
+    behind = first - np.sign(end - start) * 0.4
+    here = (np.where((x > -1e-9) & (x < 1.0 + 1e-9), x, np.nan) for x in (first, behind))
+    one, other = (np.interp(x, line.position, line) for x in here)
+    expected = 3.0 * np.nan_to_num(one) + 5.0 * np.nan_to_num(other)
+    assert found.middle.values == pytest.approx(expected, abs=1e-3 * expected.max())
+    for axle, place in ((0, first), (1, behind)):
+        on = (place > -1e-9) & (place < 1.0 + 1e-9)
+        assert np.isfinite(found.contact_force.values[:, axle]).tolist() == on.tolist()
+    assert np.isfinite(found["first"].values).tolist() == np.isfinite(found.middle_influence.values).tolist()
+    assert np.isnan(found["first"].values).any()
+    for name in ("first", "middle", "contact_force"):
+        apart = found[f"{name}_difference"].values
+        assert np.isfinite(apart).tolist() == np.isfinite(found[name].values).tolist()
+        assert np.nanmax(np.abs(apart)) < 1e-3

@@ -19,7 +19,6 @@ from studies.results.formatting import counted, number, percent
 from studies.results.results import Results
 from studies.runs.audit_findings import relative_errors
 
-MANY = 0.1  # of all numbers: beyond, a title says how many are further off and not how many are not
 LEAST = 1e-6  # what is smaller stands there, at the end of the logarithmic axis
 LEAST_POINTS = 2  # of a figure: a single number is a sentence
 MOST_RESULTS = 18  # that are shown: first those that are nearest to their tolerances, then those without one
@@ -110,10 +109,9 @@ def compared(group: xr.Dataset | None) -> list[Figure]:
     pairs = np.maximum(np.stack([told[both], observed[both]]), LEAST)
     times, variants = pairs[1] / pairs[0], counted(int(both.any(axis=1).sum()), "variant")
     beyond = int(np.count_nonzero(times > 1.0))
-    some = f"All but {beyond:,} of {counted(times.size, 'audited number')} are"
-    title = f"{some if beyond else f'All {times.size:,} audited numbers are'} no further off than estimated"
-    if beyond > MANY * times.size:
-        title = f"{beyond:,} of {counted(times.size, 'audited number')} are further off than estimated"
+    further = f"{beyond:,} of {counted(times.size, 'audited number')} {'is' if beyond == 1 else 'are'} further off"
+    none = f"All {times.size:,} audited numbers are no further off"
+    title = f"{further if beyond else none} than estimated"
     caption = f"{variants}, a dot for every reported number; below the line its estimate was large enough."
     if times.max() > 1.0:
         worst = np.broadcast_to(group["result"].values, both.shape)[both][np.argmax(times)]
