@@ -112,10 +112,16 @@ class PushStatics:
 
     def influence(self, direction: Direction) -> TrackInfluence:
         """Of the motion in a direction."""
+        return self.deflection if direction == "load" else self._by_line[direction]
+
+    @cached_property
+    def _by_line(self) -> dict[Direction, TrackInfluence]:
+        """By the lines of other directions; each keeps its cubics."""
         own = self.deflection
-        if direction == "load":
-            return own
-        return TrackInfluence(self.lines[direction], own.loads, own.patterns, own.flexibility)
+        return {
+            direction: TrackInfluence(line, own.loads, own.patterns, own.flexibility)
+            for direction, line in self.lines.items()
+        }
 
 
 @dataclass(frozen=True, eq=False)
