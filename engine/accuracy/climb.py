@@ -86,8 +86,8 @@ class Climb:
         steps. Raises Halted, and Crashed by the places of pilots."""
         refer = partial(converge, part=REFERENCE_PART, share=self.share)
         levels, full = list[Level](), Marches(self.grid, self.values, in_full(self.grid))
-        aim = refer(self.grid, self.values, as_fixed(self.grid), seen=levels.append)
-        truth = aim if is_free(self.grid) else refer(*full)
+        aim = refer(Marches(self.grid, self.values, as_fixed(self.grid)), seen=levels.append)
+        truth = aim if is_free(self.grid) else refer(full)
         self.rungs = Rungs(self.grid, self.values, self.ladder, self.span, truth, aim, self._judged(levels))
         shape = len(self.ladder.columns), len(self.ladder.cuts), self.values.size
         self.found = [(np.zeros(1, dtype=np.int64), np.full((1, len(truth.error)), np.inf))]

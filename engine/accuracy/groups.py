@@ -7,7 +7,6 @@ from abc import abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from functools import cached_property
-from math import lcm
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
@@ -27,11 +26,11 @@ from engine.accuracy.reference import (
     level_work,
 )
 from engine.accuracy.results import Result, differences, results_of, tolerances, worst_held
+from engine.accuracy.shown import Histories, Shown, fine_enough
 from engine.kernels.layout import STATISTICS
-from engine.march.outcome import USED, number_of, outcome, used, vibration
+from engine.march.outcome import NOWHERE, USED, number_of, outcome, used, vibration
 from engine.march.rest import counts_settling
 from engine.model.timeline import MOST_STATIONS
-from engine.observation.histories import CYCLE_STATIONS, WHOLE_STATIONS
 from results_schema.arrays import Array, Counts, split
 from results_schema.gravest_status import lost
 from results_schema.status import Fidelity
@@ -56,12 +55,14 @@ TRUTH_PART = 0.1  # the same of the reference of an answer within what a study f
 
 class Found(NamedTuple):
     """What V variants report, what they were computed with (by the names of the archive), the estimated errors
-    (R, V), and the largest of those that are held, less what the study fixes, over their tolerances (V,)."""
+    (R, V), and the largest of those that are held, less what the study fixes, over their tolerances (V,); shown: the
+    histories of those of them, by their places, whose marches had what is kept of them."""
 
     outcome: Outcome
     used: Flat
     error: Array
     held: Array
+    shown: tuple[tuple[Counts, Histories], ...] = ()
 
 
 @dataclass(eq=False)
@@ -78,10 +79,16 @@ class Group:
 
     @abstractmethod
     def found(
-        self, values: VariantValues, variants: Counts, choice: Choice | None, halted: Halted, kept: Kept = "numbers"
+        self,
+        values: VariantValues,
+        variants: Counts,
+        choice: Choice | None,
+        halted: Halted,
+        kept: Kept = "numbers",
+        shown: Counts = NOWHERE,
     ) -> Found:
-        """The results of some of its variants; kept: with the histories at the grid's stations or not. Raises
-        Halted."""
+        """The results of some of its variants; kept: with the histories at the grid's stations or not; shown: places of
+        those whose histories are kept, which may come with them. Raises Halted."""
 
     @property
     @abstractmethod
@@ -166,7 +173,13 @@ class MarchGroup(Group):
         return float(self.model.body_modes * self.tables.steps)
 
     def found(
-        self, values: VariantValues, variants: Counts, choice: Choice | None, halted: Halted, kept: Kept = "numbers"
+        self,
+        values: VariantValues,
+        variants: Counts,
+        choice: Choice | None,
+        halted: Halted,
+        kept: Kept = "numbers",
+        shown: Counts = NOWHERE,
     ) -> Found:
         if choice is None:
             now, unknown = self._marched(values, halted, kept), np.full((len(self._results), variants.size), np.nan)
@@ -253,24 +266,32 @@ class ConvergingGroup(Group):
         return self.grid.tables(self.grid.model(as_fixed(self.grid).numerics[0]), 1)
 
     def found(
-        self, values: VariantValues, variants: Counts, choice: Choice | None, halted: Halted, kept: Kept = "numbers"
+        self,
+        values: VariantValues,
+        variants: Counts,
+        choice: Choice | None,
+        halted: Halted,
+        kept: Kept = "numbers",
+        shown: Counts = NOWHERE,
     ) -> Found:
         asked, results = self.grid.asked, results_of(self.grid.asked)
-        levels = as_fixed(self.grid)
+        levels, histories = as_fixed(self.grid), Shown(shown)
         share, tighter = InTurn(halted), values.tighter
-        own = converge(self.grid, values, levels, ANSWER_PART, share=share)
+        marches = Marches(self.grid, values, levels, histories)
+        own = converge(marches, ANSWER_PART, share=share)
+        known = tuple(histories.rows())
         if is_free(self.grid):
-            told = own.error + left_by_elements(Marches(self.grid, values, levels), own, share)
-            return Found(own.outcome, own.used, told, worst_held(own.error, results, tighter))
+            told = own.error + left_by_elements(marches, own, share)
+            return Found(own.outcome, own.used, told, worst_held(own.error, results, tighter), known)
         apart = np.full(own.error.shape, np.nan)
         if (whole := np.flatnonzero(~lost(own.outcome.status))).size:  # nothing is told of the others
             full = Marches(self.grid, values.part(whole), in_full(self.grid))
-            truth = converge(*full, TRUTH_PART, share=share)
+            truth = converge(full, TRUTH_PART, share=share)
             beside = differences(asked, self.scene, full.values, own.outcome.of(whole), truth.outcome)
             apart[:, whole] = beside + truth.error + left_by_elements(full, truth, share)
         left_open = len(levels.numerics) > 1
         held = worst_held(own.error, results, tighter) if left_open else np.zeros(values.size)
-        return Found(own.outcome, own.used, apart, held)
+        return Found(own.outcome, own.used, apart, held, known)
 
 
 def marches_again(grid: SceneGrid, used: Flat) -> Iterator[tuple[SceneTables, Counts]]:
@@ -284,13 +305,8 @@ def marches_again(grid: SceneGrid, used: Flat) -> Iterator[tuple[SceneTables, Co
 def _tables(grid: SceneGrid, fidelity: int, scheme: int, modes: int, steps: int) -> SceneTables:
     """The tables of a march; where the study leaves its steps open, finer ones if there are too few for a history."""
     model = _model(grid, fidelity, scheme, modes)
-    unit = grid.unit * model.scheme.stride
-    by = max(1, steps // unit)
-    if grid.fixed or grid.asked.study.output.histories != "auto":
-        return grid.tables(model, by)
-    if grid.asked.window == "last-cycle":  # all variants have the same phases
-        return grid.tables(model, lcm(by * unit, CYCLE_STATIONS) // unit)
-    return grid.tables(model, by * -(-(WHOLE_STATIONS - 1) // (by * unit)))
+    by = max(1, steps // (grid.unit * model.scheme.stride))
+    return grid.tables(model, fine_enough(grid, model, by))
 
 
 def _model(grid: SceneGrid, fidelity: int, scheme: int, modes: int) -> SceneModel:

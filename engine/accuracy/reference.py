@@ -26,8 +26,9 @@ from engine.accuracy.grids import (
 )
 from engine.accuracy.jobs import InTurn, Job, Share
 from engine.accuracy.results import deciding, differences, results_of, worst_held
+from engine.accuracy.shown import Shown
 from engine.kernels.schemes import Scheme
-from engine.march.outcome import USED, Flat, Outcome, number_of, outcome, used
+from engine.march.outcome import NOWHERE, USED, Flat, Outcome, number_of, outcome, used
 from engine.march.step_rules import least_steps
 from engine.model.numerics import Numerics, open_bodies
 from engine.scene.variants import VariantValues
@@ -64,9 +65,10 @@ LEFT_BY_ELEMENTS = 4.0 / 3.0
 class Converged:
     """What V variants report by the last of their levels: error (R, V) of every result, NaN where no estimate exists;
     used (V,) by the names of the archive; settled (V,): whether the held results changed by less than was wanted; spent
-    (V,): modes x steps of all levels; level (V,): the last one's number."""
+    (V,): modes x steps of all levels; level (V,): the last one's number; before: what they report by the one before."""
 
     outcome: Outcome
+    before: Outcome
     error: Array
     used: Flat
     settled: NDArray[np.bool_]
@@ -135,17 +137,16 @@ class Level(NamedTuple):
 
 
 class Marches(NamedTuple):
-    """Variants that are marched level by level."""
+    """Variants that are marched level by level, and what keeps histories of some."""
 
     grid: SceneGrid
     values: VariantValues
     levels: Levels
+    shown: Shown | None = None
 
 
 def converge(
-    grid: SceneGrid,
-    values: VariantValues,
-    levels: Levels,
+    marches: Marches,
     part: float,
     beyond: Beyond = NO_FURTHER,
     share: Share = IN_TURN,
@@ -154,13 +155,15 @@ def converge(
     """March variants level by level until what is held is off by no more than ``part`` of its tolerance, and
     levels ``beyond``; ``share`` does the marches of a level, ``seen`` is shown what they find. Raises Halted, and
     Crashed by the places of variants."""
+    grid, values, levels, _ = marches
     asked, results = grid.asked, results_of(grid.asked)
     decisive = deciding(results, asked.study.solver.tolerance)
-    march = partial(_march, Marches(grid, values, levels), share, seen=seen)
+    march = partial(_march, marches, share, seen=seen)
     pushes_along = any("along" in carriage.pushes for carriage in asked.study.carriage.values())
     stays = STAYS if levels.numerics[0].static_correction else STAYS_UNCORRECTED
     now, spent = march(np.arange(values.size), 0)
     found = Converged(
+        now,
         now,
         np.full((len(results), values.size), np.nan),
         spent,
@@ -223,18 +226,19 @@ def left_along(change: Array, before: Array, stays: float) -> Array:
 def _updated(found: Converged, lanes: Counts, now: Outcome, spent: Flat, error: Array) -> Converged:
     whole = lanes.size == found.settled.size
     everything = now if whole else found.outcome.replaced(lanes, now)
+    before = found.outcome if whole else found.before.replaced(lanes, found.outcome.of(lanes))
     errors, used_ = found.error.copy(), {name: column.copy() for name, column in found.used.items()}
     errors[:, lanes] = error
     for name, column in used_.items():
         column[lanes] = spent[name]
-    return replace(found, outcome=everything, error=errors, used=used_)
+    return replace(found, outcome=everything, before=before, error=errors, used=used_)
 
 
 def _march(
     marches: Marches, share: Share, lanes: Counts, level: int, seen: Callable[[Level], object] = lambda level: None
 ) -> tuple[Outcome, Flat]:
     """One level of some of the variants, ascending, each with its own number of steps."""
-    grid, values, levels = marches
+    grid, values, levels, _ = marches
     by = _by(grid, values.part(lanes), levels, level)
     cuts = [int(cut) for cut in np.unique(by)[::-1]]
     marched = list(share(marches, [Job(partial(_on_cut, level=level, cut=cut), lanes[by == cut]) for cut in cuts]))
@@ -244,20 +248,20 @@ def _march(
 
 
 def left_by_elements(marches: Marches, found: Converged, share: Share) -> Array:
-    """(R, V) of every result that variants report by the last of their levels, NaN where no estimate exists; nothing
-    where no body is cut into elements. Raises Halted, and Crashed by the places of variants."""
-    grid, values, levels = marches
+    """(R, V) of every result that variants report, by what twice the elements change at the level before their last:
+    frequencies drift alike there, at a quarter of the work. NaN where no estimate exists; nothing where no body is cut
+    into elements. Raises Halted, and Crashed by the places of variants."""
+    grid, values, levels, _ = marches
     error: Array = np.zeros((len(results_of(grid.asked)), values.size))
     if not grid.is_meshed:
         return error
     finer = Levels(tuple(numerics._replace(elements=2) for numerics in levels.numerics), levels.steps)
-    for level in np.unique(found.level):
-        lanes = np.flatnonzero(found.level == level)
+    earlier = np.maximum(found.level - 1, 0)
+    for level in np.unique(earlier):
+        lanes = np.flatnonzero(earlier == level)
         now, _ = _march(Marches(grid, values, finer), share, lanes, int(level))
-        model = grid.model(finer.numerics[level])
-        error[:, lanes] = LEFT_BY_ELEMENTS * differences(
-            grid.asked, model, values.part(lanes), found.outcome.of(lanes), now
-        )
+        model, before = grid.model(finer.numerics[level]), found.before.of(lanes)
+        error[:, lanes] = LEFT_BY_ELEMENTS * differences(grid.asked, model, values.part(lanes), before, now)
     return np.where(np.isinf(error), np.nan, error)
 
 
@@ -276,12 +280,15 @@ def _on_cut(
     marches: Marches, lanes: Counts, halted: Callable[[], bool], *, level: int, cut: int
 ) -> tuple[Counts, Outcome, Flat]:
     """Variants of a level that take as many steps."""
-    grid, values, levels = marches
+    grid, values, levels, shown = marches
     model = grid.model(levels.numerics[level])
     tables = grid.once(model, cut)
-    now = outcome(grid.asked, tables, values.part(lanes), grid.stations(model, cut), halted)
+    kept = NOWHERE if shown is None else shown.stations(grid, tables, cut, lanes)
+    now = outcome(grid.asked, tables, values.part(lanes), grid.stations(model, cut), halted, kept)
     tables.forget()
-    return lanes, now, used(tables, lanes.size)
+    if shown is not None:
+        shown.keep(lanes, now.shown)
+    return lanes, replace(now, shown={}), used(tables, lanes.size)
 
 
 def _by(grid: SceneGrid, values: VariantValues, levels: Levels, level: int) -> Counts:

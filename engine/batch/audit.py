@@ -16,7 +16,18 @@ from engine.accuracy.climb import REFERENCE_PART
 from engine.accuracy.grids import SceneGrid
 from engine.accuracy.groups import PACE
 from engine.accuracy.jobs import Crashed, Halted, Job, Share, over_scenes
-from engine.accuracy.reference import DEAR, IN_TURN, Beyond, Converged, converge, in_full, is_last, passages, usual_work
+from engine.accuracy.reference import (
+    DEAR,
+    IN_TURN,
+    Beyond,
+    Converged,
+    Marches,
+    converge,
+    in_full,
+    is_last,
+    passages,
+    usual_work,
+)
 from engine.accuracy.results import differences, results_of
 from engine.batch.chunk import told_errors
 from engine.batch.plan import Plan
@@ -154,7 +165,7 @@ def _of_scene(plan: Plan, own: Counts, share: Share, scene: int) -> list[Audit]:
     grid = plan.grids[scene]
     values = VariantValues.of(grid.scene.study, plan.cases, own)
     try:
-        truth = converge(grid, values, in_full(grid), REFERENCE_PART, Beyond(1, _dear(plan)), share)
+        truth = converge(Marches(grid, values, in_full(grid)), REFERENCE_PART, Beyond(1, _dear(plan)), share)
         groups = [number for number, group in enumerate(plan.groups) if group.grid is grid]
         among = ((number, _among(own, plan.groups[number].variants, plan.size)) for number in groups)
         parts = [(number, np.flatnonzero(held)) for number, held in among]

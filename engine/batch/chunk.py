@@ -13,10 +13,10 @@ from engine.accuracy.grids import SceneGrid
 from engine.accuracy.groups import Found, Group, marches_again
 from engine.accuracy.jobs import Halted, Job, Share
 from engine.accuracy.results import Result, results_of, worst_held
+from engine.accuracy.shown import stations_shown
 from engine.batch.plan import NOBODY, Plan
 from engine.linear_algebra import one_thread
 from engine.march.outcome import USED, Flat, histories
-from engine.observation.histories import counts_at_rest, counts_shown
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts
 from results_schema.errors import WorkersGaveUp
@@ -41,7 +41,8 @@ def run_chunk(
     """The results (V, ...) of some variants of a group by name, and the histories of those that are kept. Raises
     Halted."""
     values = plan.values(group, variants)
-    found = group.found(values, variants, plan.choice, halted)
+    kept = np.flatnonzero(np.isin(variants, plan.shown))
+    found = group.found(values, variants, plan.choice, halted, shown=kept)
     results = results_of(plan.asked)
     error, status = told_errors(found, results), _status(plan, group, found)
     missing = lost(status)
@@ -54,8 +55,10 @@ def run_chunk(
         "estimated_error": np.ascontiguousarray(error.T, dtype=np.float32),
         "error_estimate": _worst(error, results),
     }
-    kept = np.flatnonzero(np.isin(variants, plan.shown))
-    return flat, joined(list(_marched_again(plan, group.grid, variants[kept], _of(found.used, kept), halted)))
+    known = [Rows(variants[lanes], arrays) for lanes, arrays in found.shown]
+    left = np.setdiff1d(kept, [lane for lanes, _ in found.shown for lane in lanes]).astype(np.int64)
+    again = _marched_again(plan, group.grid, variants[left], _of(found.used, left), halted)
+    return flat, joined([*known, *again])
 
 
 def told_errors(found: Found, results: tuple[Result, ...]) -> Array:
@@ -112,9 +115,7 @@ def _marched_again(
         return
     values = VariantValues.of(grid.scene.study, plan.cases, variants)
     for tables, own in marches_again(grid, used):
-        counts = counts_shown(tables.timeline, plan.asked.window, plan.study.output.histories)
-        if tables.watches_rest and plan.study.output.histories == "auto":
-            counts = np.union1d(counts, counts_at_rest(tables.timeline))
+        counts = stations_shown(plan.asked, tables)
         yield Rows(variants[own], histories(tables, values.part(own), counts, halted))
 
 

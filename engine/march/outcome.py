@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,6 +31,7 @@ from results_schema.status import Fidelity, SchemeUsed, Status
 if TYPE_CHECKING:
     from engine.scene.study import Study
 
+NOWHERE: Counts = np.zeros(0, dtype=np.int64)
 STILL = 1e-6  # of the usual reading on its body: a static reading below, as on a support, is rounding (1e-12 at most)
 
 Flat = dict[str, NDArray[Any]]
@@ -66,13 +67,15 @@ class Asked:
 class Outcome:
     """What V variants report by one march: numbers (V, ...) by name, histories (H, S, V) of all signals at the stations
     that were asked for, statuses and the first diverged steps (V,), and (V, J) what errors of the sensors are divided
-    by, infinite for those that read but rounding."""
+    by, infinite for those that read but rounding. shown: histories (V, H) as archives keep them, by name; none where
+    they were not asked for."""
 
     numbers: Flat
     history: Array
     status: NDArray[np.int8]
     diverged_step: Counts
     scale: Array
+    shown: dict[str, Array] = field(default_factory=dict)
 
     def of(self, lanes: Counts | NDArray[np.bool_]) -> Outcome:
         """Some of the variants."""
@@ -98,11 +101,13 @@ def outcome(
     values: VariantValues,
     stations: Counts,
     halted: Callable[[], bool] = lambda: False,
+    shown: Counts = NOWHERE,
 ) -> Outcome:
-    """March variants with some tables; ``stations``: of which histories are wanted, by their count. Raises Halted."""
+    """March variants with some tables; ``stations``: of which histories are wanted, by their count; ``shown``: of which
+    they are kept in archives. Raises Halted."""
     own = counts_reduced(tables.timeline, asked.reduction.stations) if asked.reduction is not None else stations[:0]
     watched = (counts_settling(tables), *(side.counts for side in tables.kinks))
-    counts = np.unique(np.concatenate([own, stations, *watched]))
+    counts = np.unique(np.concatenate([own, stations, shown, *watched]))
     lanes, size = in_whole_blocks(values), values.size
     marched = march_scheme(tables, lanes, counts, size, halted, len(tables.signals) if stations.size else None)
     _silence(tables, marched)
@@ -122,7 +127,8 @@ def outcome(
     for array in numbers.values():
         if array.dtype == np.float64:
             array[nothing] = np.nan
-    return Outcome(numbers, history, status, diverged_step, _scale(tables, values, numbers))
+    kept = _described(tables, values, shown, marched, counts) if shown.size else {}
+    return Outcome(numbers, history, status, diverged_step, _scale(tables, values, numbers), kept)
 
 
 USED = ("fidelity_used", "scheme_used", "modes_used", "steps_used")  # what a variant is marched again by
@@ -326,10 +332,17 @@ def histories(
     """(V, H) histories of the sensors and of the carriages' ways at stations by their count."""
     marched = march_scheme(tables, in_whole_blocks(values), counts, values.size, halted)
     _silence(tables, marched)
-    time_scale = values.scene_time_scale
+    return _described(tables, values, counts, marched, counts)
+
+
+def _described(
+    tables: SceneTables, values: VariantValues, counts: Counts, marched: Marched, sampled: Counts
+) -> dict[str, Array]:
+    """The same of what was marched and ``sampled`` at these stations and others."""
+    time_scale, places = values.scene_time_scale, np.searchsorted(sampled, counts)
     arrays: dict[str, Array] = {"elapsed": elapsed(tables, counts, time_scale)}
     for j, sensor in enumerate(tables.sensors):
-        arrays[sensor.name] = marched.history[:, j].T
+        arrays[sensor.name] = marched.history[places, j].T
     for c, carriage in enumerate(tables.model.carriages):
         path = tables.timeline.motion(c, counts.astype(np.float64))
         arrays[f"{carriage.name}_position"] = np.repeat(path.S[None, :], values.size, axis=0)

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from engine.accuracy.choice import Choice
-from engine.accuracy.reference import converge, in_full
+from engine.accuracy.reference import Marches, converge, in_full
 from engine.accuracy.results import differences, results_of
 from engine.batch.execution import execute
 from engine.batch.executors import Shared, Threads
@@ -102,6 +102,6 @@ def observed(name: str) -> Array:
     for group in run.plan.groups:
         values = run.plan.values(group, group.variants)
         own = group.found(values, group.variants, run.choice, lambda: False, "histories").outcome
-        truth = converge(group.grid, values, in_full(group.grid), 0.01)
+        truth = converge(Marches(group.grid, values, in_full(group.grid)), 0.01)
         found[:, group.variants] = differences(run.plan.asked, group.scene, values, own, truth.outcome)
     return found

@@ -16,7 +16,7 @@ from engine.accuracy.choice import (
     pilots_of,
     scenes_of_pilots,
 )
-from engine.accuracy.reference import converge, in_full
+from engine.accuracy.reference import Marches, converge, in_full
 from engine.accuracy.results import results_of
 from engine.batch.plan import make_plan
 from engine.kernels.nearest_pilots import ALIKE, cheapest, nearest
@@ -141,7 +141,7 @@ def test_what_is_chosen_holds_the_tolerance(name: str) -> None:
 def test_a_choice_costs_less_than_converging() -> None:
     run = run_of("passages")
     (grid,) = run.plan.grids
-    reference = converge(grid, grid.values, in_full(grid), 0.5)
+    reference = converge(Marches(grid, grid.values, in_full(grid)), 0.5)
     assert run.arrays["work"].mean() < 0.5 * reference.used["work"].mean()
 
 

@@ -16,6 +16,7 @@ from engine.accuracy.reference import (
     STAYS_UNCORRECTED,
     Beyond,
     Converged,
+    Marches,
     as_fixed,
     converge,
     in_full,
@@ -40,7 +41,7 @@ PART = 0.1  # of the tolerance by which an answer may still change
 
 
 def levels(grid: SceneGrid, part: float = PART, beyond: int = 0) -> Converged:
-    return converge(grid, grid.values, as_fixed(grid), part, Beyond(beyond, DEAR))
+    return converge(Marches(grid, grid.values, as_fixed(grid)), part, Beyond(beyond, DEAR))
 
 
 def told(grid: SceneGrid, found: Converged, name: str) -> np.ndarray:
@@ -112,8 +113,8 @@ SCENES: dict[str, Study] = {
 def test_what_is_told_is_no_less_than_the_truth(name: str) -> None:
     """Of the held results, against a level beyond those that changed by a hundredth."""
     grid = only_grid(SCENES[name])
-    found = converge(grid, grid.values, in_full(grid), 0.5)
-    truth = converge(grid, grid.values, in_full(grid), 0.01, beyond=Beyond(1, DEAR))
+    found = converge(Marches(grid, grid.values, in_full(grid)), 0.5)
+    truth = converge(Marches(grid, grid.values, in_full(grid)), 0.01, beyond=Beyond(1, DEAR))
     off = differences(grid.asked, grid.scene, grid.values, found.outcome, truth.outcome)
     held = np.isfinite([result.tolerance for result in results_of(grid.asked)])
     over = off[held] / (found.error[held] + truth.error[held])
@@ -132,7 +133,7 @@ def test_a_variant_does_not_depend_on_its_neighbours() -> None:
     grid = only_grid(passages(4, 3, output={"histories": "auto"}))
     whole = levels(grid)
     for lane in (0, 5, 11):
-        alone = converge(grid, grid.values.part(np.array([lane])), as_fixed(grid), PART)
+        alone = converge(Marches(grid, grid.values.part(np.array([lane])), as_fixed(grid)), PART)
         for name, numbers in alone.outcome.numbers.items():
             assert numbers.tobytes() == whole.outcome.numbers[name][[lane]].tobytes(), name
         assert alone.error.tobytes() == np.ascontiguousarray(whole.error[:, [lane]]).tobytes()
@@ -146,7 +147,7 @@ def test_a_diverging_variant_has_no_error() -> None:
     way = swing(0.5, 0.5, 0.608 * 0.5 * math.pi, 150)
     sweep = {"weight": {"of": WEIGHT, "values": [0.001, 1.0, 0.002]}}
     grid = only_grid(study(beam(modes=3), mass(0.5, way), sweep=sweep, solver={"steps": 200}))
-    found = converge(grid, grid.values, in_full(grid), 1.0)
+    found = converge(Marches(grid, grid.values, in_full(grid)), 1.0)
     assert found.outcome.status.tolist() == [Status.OK, Status.DIVERGED, Status.OK]
     assert np.isnan(found.error[:, 1]).all() and not found.settled[1]
     assert np.isnan(found.outcome.numbers["midspan_max"]).tolist() == [False, True, False]

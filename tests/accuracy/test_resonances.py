@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 
-from engine.accuracy.reference import converge, in_full
+from engine.accuracy.reference import Marches, converge, in_full
 from engine.accuracy.results import differences, results_of, worst_held
 from engine.batch.execution import execute
 from engine.batch.executors import Shared, Threads
@@ -82,7 +82,7 @@ def test_variants_that_resonate_between_pilots_are_marched_again_and_hold() -> N
     (grid,), again = plan.grids, np.flatnonzero(found["work"] > foreseen(plan))
     assert again.size > 3
     values = VariantValues.of(grid.scene.study, plan.cases, again)
-    truth = converge(grid, values, in_full(grid), 0.1)
+    truth = converge(Marches(grid, values, in_full(grid)), 0.1)
     before, after = [], []
     for group in plan.groups:
         own = np.flatnonzero(np.isin(again, group.variants))

@@ -13,7 +13,7 @@ from multiprocessing import get_context
 
 import numpy as np
 
-from engine.accuracy.reference import Levels, converge, in_full
+from engine.accuracy.reference import Levels, Marches, converge, in_full
 from engine.accuracy.results import Result, differences, results_of
 from engine.batch.chunk import told_errors
 from engine.batch.plan import Plan
@@ -157,7 +157,7 @@ def errors_of(plan: Plan, variants: Counts) -> Iterator[tuple[Result, Array]]:
             values, levels = plan.values(group, own), in_full(group.grid)
             now = group.found(values, own, plan.choice, lambda: False, "histories")
             finer = Levels(tuple(one._replace(elements=TIMES) for one in levels.numerics), levels.steps)
-            truth = converge(group.grid, values, finer, PART)
+            truth = converge(Marches(group.grid, values, finer), PART)
             true = differences(plan.asked, group.scene, values, now.outcome, truth.outcome)
             found.append(np.stack([told_errors(now, results_of(plan.asked)), true, truth.error], axis=1))
     for result, errors in zip(results_of(plan.asked), np.concatenate(found, axis=2), strict=True):
