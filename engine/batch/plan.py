@@ -57,8 +57,10 @@ READ_BYTES = 40  # of a variant, at most, while an answer is made of some arrays
 SHOWN = 64  # variants whose histories are kept by default
 NAMED = 16  # most of those beside, which the answer names
 #: Variants, of a study and in the mean of its scenes, up to which each converges by itself: a ladder for pilots costs
-#: about as much as the convergence of two hundred variants of one scene.
-FEW, FEW_IN_SCENE = 256, 16
+#: about as much as the convergence of two hundred variants of one scene. With more scenes pilots are worth it however
+#: few variants each has: a scene's ladder takes two to four times as long as that its variants converge, a march by what
+#: pilots tell a tenth of that.
+FEW, FEW_IN_SCENE, FEW_SCENES = 256, 16, 128
 NOBODY: Counts = np.zeros(0, dtype=np.int64)
 
 
@@ -104,7 +106,7 @@ class Plan:
     @property
     def converges(self) -> bool:
         """Whether every variant is marched until its results stay: where there are few."""
-        return self.size <= max(FEW, FEW_IN_SCENE * len(self.grids))
+        return self.size <= max(FEW, FEW_IN_SCENE * len(self.grids)) and len(self.grids) <= FEW_SCENES
 
     @property
     def groups(self) -> tuple[Group, ...]:

@@ -110,7 +110,7 @@ def _without_pilots(plan: Plan, looked: Looked, threads: int, tried: float) -> F
     there was no time to begin."""
     pilots = usual_pilots(plan.size)
     less = f"there was no time for pilots: a run measures {pilots}, and takes what they show to be enough"
-    scenes = scenes_of_pilots(len(plan.grids), pilots)  # which are shared out as wholes, where there are several
+    scenes = scenes_of_pilots(len(plan.grids), plan.size, pilots)  # which are shared out as wholes, where there are several
     seconds = max(BROKEN_OFF * tried, CLIMB * looked.seconds * scenes / min(threads, scenes))
     if not looked.parts:
         return Forecast(plan, "", (), seconds, f"{less}; this may take longer")
@@ -138,7 +138,9 @@ def _choose(plan: Plan, threads: int, looked: Looked, end: float, rounds: Sequen
     usual = usual_pilots(plan.size)
     more = "" if pilots >= usual else f"; a run measures {usual} and knows better"
     title = f"What variants are computed with, by the measured errors of {min(pilots, usual)} pilots{more}"
-    scenes, more_scenes = (scenes_of_pilots(len(plan.grids), count) for count in (pilots, max(usual, pilots)))
+    scenes, more_scenes = (
+        scenes_of_pilots(len(plan.grids), plan.size, count) for count in (pilots, max(usual, pilots))
+    )
     longer = more_scenes / scenes * max(1.0, usual * scenes / (pilots * more_scenes)) ** 0.5
     seconds = took * longer + trial.seconds * _pace(trial) / threads
     return Forecast(trial, title, chosen.rows(chosen.chosen(trial)), seconds)

@@ -80,7 +80,7 @@ def test_pilots_are_distinct_variants_of_a_few_scenes() -> None:
     np.testing.assert_array_equal(found, pilots_of(plan.cases, plan.members))
     assert found.size == FEWEST_PILOTS == np.unique(found).size and found.max() < plan.size
     scenes = sum(np.isin(members, found).any() for members in plan.members)
-    assert scenes == scenes_of_pilots(len(plan.members), FEWEST_PILOTS) <= MOST_SCENES < len(plan.members)
+    assert scenes == scenes_of_pilots(len(plan.members), plan.size, FEWEST_PILOTS) <= MOST_SCENES < len(plan.members)
 
 
 def test_more_variants_have_more_pilots() -> None:
