@@ -241,11 +241,11 @@ def scenes_of_pilots(scenes: int, size: int, count: int) -> int:
     >>> scenes_of_pilots(1, 500, 128), scenes_of_pilots(25, 2400, 200), scenes_of_pilots(100, 10_000, 256)
     (1, 24, 24)
     >>> scenes_of_pilots(200, 200, 128), scenes_of_pilots(900, 900, 128), scenes_of_pilots(900, 2700, 225)
-    (25, 64, 64)
+    (24, 56, 56)
     """
     own = min(LEAST_IN_SCENE, max(1, size // scenes))
-    most = MOST_SCENES if own == LEAST_IN_SCENE else min(MOST_SMALL_SCENES, max(MOST_SCENES, scenes // LEAST_IN_SCENE))
-    return min(scenes, most, max(1, count // own))
+    small = min(MOST_SMALL_SCENES, max(MOST_SCENES, scenes // IN_SMALL_SCENES))
+    return min(scenes, MOST_SCENES if own == LEAST_IN_SCENE else small, max(1, count // own))
 
 
 def pilots_of(cases: Cases, members: Sequence[Counts], most: int = PILOTS) -> Counts:
@@ -261,10 +261,10 @@ def pilots_of(cases: Cases, members: Sequence[Counts], most: int = PILOTS) -> Co
 LEAST_IN_SCENE = 8  # pilots of a scene, where there are so many: about as many as the neighbours that are asked
 MOST_UNHELD = 5e6  # modes x steps, about two milliseconds, that a variant takes whose tolerance nothing holds
 AT_ONCE = 65536  # variants that are chosen for at once: some ten milliseconds
-#: Scenes that pilots are drawn from, as each climbs the ladder by tables of its own, about a second; and where they have
-#: a few variants each, as of swept motions. By 16, 64 and 128 of 512 such scenes of a beam and of a portal, three swept
-#: numbers, at 1e-2 and 1e-3, none of 30 to 40 variants missed, and 0 to 2.6 % of the errors were told too small.
-MOST_SCENES, MOST_SMALL_SCENES = 24, 64
+#: Scenes that pilots are drawn from, as each climbs the ladder by tables of its own, about a second; and where they
+#: have a few variants each, as of swept motions. By 16, 64 and 128 of 512 such scenes of a beam and of a portal, three
+#: swept numbers, at 1e-2 and 1e-3, none of 30 to 40 variants missed, and 0 to 2.6 % of errors were told too small.
+MOST_SCENES, MOST_SMALL_SCENES, IN_SMALL_SCENES = 24, 64, 16
 
 
 def tolerance_span(asked: Asked, cases: Cases) -> tuple[float, float]:

@@ -24,6 +24,7 @@ from results_schema.gravest_status import gravest, lost
 from results_schema.status import Status
 from results_schema.store.rows import Arrays, Chunk, Rows, joined
 
+MOST_OF_TIMES = 1.0  # of a settling time: a larger error says no more than that there is no estimate
 OF_CRASHED = {"status": np.int8(Status.CRASHED), "diverged_step": np.int64(-1)}  # other whole numbers are 0
 
 
@@ -62,8 +63,8 @@ def run_chunk(
 
 
 def told_errors(found: Found, results: tuple[Result, ...]) -> Array:
-    """(R, V) the estimated errors; of places no less than a step is long, and no more than the track;
-    NaN of times that are not known."""
+    """(R, V) the estimated errors; of places no less than a step is long, and no more than the track; NaN of times that
+    are not known, and where neighbours settle a swing apart, so that nothing is told."""
     error = np.where(np.isfinite(found.error), found.error, np.nan)
     steps = np.maximum(found.used["steps_used"], 1)
     for number, result in enumerate(results):
@@ -71,7 +72,8 @@ def told_errors(found: Found, results: tuple[Result, ...]) -> Array:
             least = np.where(found.used["steps_used"] > 0, 1.0 / steps, 0.0)
             error[number] = np.minimum(np.maximum(error[number], least), 1.0)
         if result.name.endswith("_settling_time"):
-            error[number, np.isnan(found.outcome.numbers[result.name])] = np.nan
+            unknown = np.isnan(found.outcome.numbers[result.name]) | (error[number] > MOST_OF_TIMES)
+            error[number, unknown] = np.nan
     return error
 
 

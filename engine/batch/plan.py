@@ -58,7 +58,7 @@ SHOWN = 64  # variants whose histories are kept by default
 NAMED = 16  # most of those beside, which the answer names
 #: Variants, of a study and in the mean of its scenes, up to which each converges by itself: a ladder for pilots costs
 #: about as much as the convergence of two hundred variants of one scene. With more scenes pilots are worth it however
-#: few variants each has: a scene's ladder takes two to four times as long as that its variants converge, a march by what
+#: few variants each has: a scene's ladder takes two to four times as long as its variants' convergence, a march by what
 #: pilots tell a tenth of that.
 FEW, FEW_IN_SCENE, FEW_SCENES = 256, 16, 128
 NOBODY: Counts = np.zeros(0, dtype=np.int64)

@@ -91,14 +91,35 @@ def beam_shapes(places, stations, span, orders, scale, found):
 
 
 @kernel
-def combined_rows(numbers, weights, table, found):
-    """found (derivatives, stations, modes): at each station the sum of the rows ``numbers`` (stations, n) of a table
-    (rows, modes), each times its weight (derivatives, stations, n)."""
-    for j in range(weights.shape[0]):
-        for s in range(numbers.shape[0]):
-            for k in range(table.shape[1]):
+def rows_between(places, polynomials, orders, ends, stride, stations, found):
+    """Polynomials of elements between places (E + 1,) by what is known at their ends: found (derivatives, stations,
+    modes), at a joint from the right.
+
+    polynomials (derivatives, n, n): that of each of the n numbers at both ends, a value and its derivatives at the left
+    one first, on [0, 1], differentiated as often as orders (derivatives,) say;  ends (rows, modes): these numbers of an
+    element from row stride times its own number on.
+    """
+    count, element = polynomials.shape[1], 0
+    for s in range(stations.size):
+        while element > 0 and stations[s] < places[element]:
+            element -= 1
+        while element < places.size - 2 and stations[s] >= places[element + 1]:
+            element += 1
+        length = places[element + 1] - places[element]
+        x = min(max((stations[s] - places[element]) / length, 0.0), 1.0)
+        for j in range(orders.size):
+            for k in range(ends.shape[1]):
                 found[j, s, k] = 0.0
-            for i in range(numbers.shape[1]):
-                weight, row = weights[j, s, i], numbers[s, i]
-                for k in range(table.shape[1]):
-                    found[j, s, k] += weight * table[row, k]
+            scale = 1.0
+            for _ in range(orders[j]):
+                scale /= length
+            weight_scale = scale
+            for i in range(count):
+                weight_scale = scale if i == 0 or i == count // 2 else weight_scale * length
+                weight = 0.0
+                for p in range(count - 1, -1, -1):
+                    weight = weight * x + polynomials[j, i, p]
+                weight *= weight_scale
+                row = stride * element + i
+                for k in range(ends.shape[1]):
+                    found[j, s, k] += weight * ends[row, k]

@@ -110,7 +110,7 @@ def _without_pilots(plan: Plan, looked: Looked, threads: int, tried: float) -> F
     there was no time to begin."""
     pilots = usual_pilots(plan.size)
     less = f"there was no time for pilots: a run measures {pilots}, and takes what they show to be enough"
-    scenes = scenes_of_pilots(len(plan.grids), plan.size, pilots)  # which are shared out as wholes, where there are several
+    scenes = scenes_of_pilots(len(plan.grids), plan.size, pilots)
     seconds = max(BROKEN_OFF * tried, CLIMB * looked.seconds * scenes / min(threads, scenes))
     if not looked.parts:
         return Forecast(plan, "", (), seconds, f"{less}; this may take longer")

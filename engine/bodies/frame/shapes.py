@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,21 +19,19 @@ from numpy.typing import ArrayLike
 from engine.bodies.frame.elements import stiffness
 from engine.bodies.frame.track import TrackBeams, track_places
 from engine.bodies.modal.modal_body import Array
-from engine.kernels.shapes import combined_rows
+from engine.kernels.shapes import rows_between
 
 FORCES = 6  # N, Q_y, Q_z, T, M_y, M_z
 SOURCES = 6  # of a quintic: value, slope and curvature at both ends
 
 # Of value, slope and curvature at the left end, then at the right one: coefficients of x^0 to x^5 on [0, 1].
-_QUINTIC = np.array(
-    [
-        [1.0, 0.0, 0.0, -10.0, 15.0, -6.0],
-        [0.0, 1.0, 0.0, -6.0, 8.0, -3.0],
-        [0.0, 0.0, 0.5, -1.5, 1.5, -0.5],
-        [0.0, 0.0, 0.0, 10.0, -15.0, 6.0],
-        [0.0, 0.0, 0.0, -4.0, 7.0, -3.0],
-        [0.0, 0.0, 0.0, 0.5, -1.0, 0.5],
-    ]
+_QUINTIC = (
+    (1.0, 0.0, 0.0, -10.0, 15.0, -6.0),
+    (0.0, 1.0, 0.0, -6.0, 8.0, -3.0),
+    (0.0, 0.0, 0.5, -1.5, 1.5, -0.5),
+    (0.0, 0.0, 0.0, 10.0, -15.0, 6.0),
+    (0.0, 0.0, 0.0, -4.0, 7.0, -3.0),
+    (0.0, 0.0, 0.0, 0.5, -1.0, 0.5),
 )
 
 
@@ -52,14 +50,9 @@ class TrackShapes:
     def derivatives(self, s: ArrayLike, orders: Sequence[int]) -> Array:
         """d^j phi_k/ds^j at the stations `s` (S,) for several j, as (orders, S, N); at a joint from the right."""
         place = track_places(s, float(self.places[-1]), *orders)
-        element = np.clip(np.searchsorted(self.places, place, side="right") - 1, 0, len(self.places) - 2)
-        length = np.diff(self.places)[element]
-        x = np.clip((place - self.places[element]) / length, 0.0, 1.0)
-        weights = np.empty((len(orders), len(place), SOURCES))
-        for j, order in enumerate(orders):
-            weights[j] = end_weights(_QUINTIC, x, length, order)
         found = np.empty((len(orders), len(place), self.values.shape[1]))
-        combined_rows(SOURCES * element[:, None] + np.arange(SOURCES), weights, self._sources, found)
+        tables = differentiated(_QUINTIC, tuple(orders))
+        rows_between(self.places, *tables, self._sources, SOURCES, place, found)
         return found
 
     @cached_property
@@ -70,16 +63,16 @@ class TrackShapes:
         return np.stack([*left, *right], axis=1).reshape(-1, self.values.shape[1])
 
 
-def end_weights(table: Array, x: Array, length: Array, derivative: int) -> Array:
-    """(S, n) d^j/ds^j at x (S,) in [0, 1] of elements of length (S,), per unit of the values and derivatives at their
-    left ends, then at the right ones; table (n, n): these as polynomials."""
-    powers, count = np.arange(len(table)), np.arange(len(table))
-    for _ in range(derivative):
-        table, powers = (table * powers)[:, 1:], powers[:-1]
-    found = np.zeros((len(count), len(x)))
-    for coefficients in table.T[::-1]:
-        found = found * x + coefficients[:, None]
-    return (found * length ** (count[:, None] % (len(count) // 2) - derivative)).T
+@lru_cache(maxsize=32)
+def differentiated(table: tuple[tuple[float, ...], ...], orders: tuple[int, ...]) -> tuple[Array, Array]:
+    """Polynomials (n, n), coefficients of powers, differentiated as often as orders say (orders, n, n), and these."""
+    found = np.zeros((len(orders), len(table), len(table)))
+    for one, order in zip(found, orders, strict=True):
+        left = np.array(table)
+        for _ in range(order):
+            left = (left * np.arange(left.shape[1]))[:, 1:]
+        one[:, : left.shape[1]] = left
+    return found, np.array(orders, dtype=np.int64)
 
 
 @dataclass(frozen=True, eq=False)

@@ -243,8 +243,10 @@ def line_of(
 
 def track_places(places: ArrayLike, length: float, *derivatives: int) -> Array:
     """Stations (S,) of a track of this length, m. Raises BadInput off the body, and for a derivative not in 0..3."""
-    stations(places, length, *derivatives)
-    return np.clip(np.atleast_1d(np.asarray(places, dtype=np.float64)), 0.0, length)
+    found = np.atleast_1d(np.asarray(places, dtype=np.float64))
+    inside = found.size and found.min() >= 0.0 and found.max() <= length
+    stations(found[:0] if inside else found, length, *derivatives)
+    return found if inside else np.clip(found, 0.0, length)
 
 
 def _or_nan(value: float | None) -> float:

@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from engine.bodies.frame.geometry import across, unit
-from engine.bodies.frame.shapes import end_weights
+from engine.bodies.frame.shapes import differentiated
 from engine.bodies.frame.track import track_places
 from engine.bodies.imported.model import HeldModel
 from engine.bodies.modal.modal_body import Array, Direction, refuse_loose
-from engine.kernels.shapes import combined_rows
+from engine.kernels.shapes import rows_between
 from results_schema.errors import BadInput
 from results_schema.lazy_imports import interpolate, sparse
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from engine.bodies.imported.imported import Imported
 
 # Of value and slope at the left end, then at the right one: coefficients of x^0 to x^3 on [0, 1].
-_CUBIC = np.array([[1.0, 0.0, -3.0, 2.0], [0.0, 1.0, -2.0, 1.0], [0.0, 0.0, 3.0, -2.0], [0.0, 0.0, -1.0, 1.0]])
+_CUBIC = ((1.0, 0.0, -3.0, 2.0), (0.0, 1.0, -2.0, 1.0), (0.0, 0.0, 3.0, -2.0), (0.0, 0.0, -1.0, 1.0))
 _ENDS = 4
 SPLINE_NODES = 4  # a spline with a third derivative
 _SQUARE = 1e-6  # cosine of the angle between track and load above which stretching along the track counts
@@ -42,7 +42,11 @@ def cubics(places: Array, s: ArrayLike, derivative: int) -> tuple[Any, Array]:
     left = np.clip(np.searchsorted(places, at, side="right") - 1, 0, len(places) - 2)
     length = np.diff(places)[left]
     x = np.clip((at - places[left]) / length, 0.0, 1.0)
-    return 2 * left[:, None] + np.arange(_ENDS), end_weights(_CUBIC, x, length, derivative)
+    (table,), numbers = differentiated(_CUBIC, (derivative,))[0], np.arange(_ENDS)
+    weights = np.zeros((_ENDS, len(at)))
+    for coefficients in table.T[::-1]:
+        weights = weights * x + coefficients[:, None]
+    return 2 * left[:, None] + numbers, (weights * length ** (numbers[:, None] % 2 - derivative)).T
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,9 +58,9 @@ class LineShapes:
 
     def derivatives(self, s: ArrayLike, orders: Sequence[int]) -> Array:
         """d^j phi_k/ds^j at the stations `s` (S,) for several j, as (orders, S, N); at a node from the right."""
-        parts = [cubics(self.places, s, order) for order in orders]
-        found = np.empty((len(orders), len(parts[0][0]), self.ends.shape[1]))
-        combined_rows(parts[0][0], np.stack([weights for _, weights in parts]), self.ends, found)
+        at = track_places(s, float(self.places[-1]), *orders)
+        found = np.empty((len(orders), len(at), self.ends.shape[1]))
+        rows_between(self.places, *differentiated(_CUBIC, tuple(orders)), self.ends, 2, at, found)
         return found
 
 
