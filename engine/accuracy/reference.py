@@ -65,10 +65,9 @@ LEFT_BY_ELEMENTS = 4.0 / 3.0
 class Converged:
     """What V variants report by the last of their levels: error (R, V) of every result, NaN where no estimate exists;
     used (V,) by the names of the archive; settled (V,): whether the held results changed by less than was wanted; spent
-    (V,): modes x steps of all levels; level (V,): the last one's number; before: what they report by the one before."""
+    (V,): modes x steps of all levels; level (V,): the last one's number."""
 
     outcome: Outcome
-    before: Outcome
     error: Array
     used: Flat
     settled: NDArray[np.bool_]
@@ -164,7 +163,6 @@ def converge(
     now, spent = march(np.arange(values.size), 0)
     found = Converged(
         now,
-        now,
         np.full((len(results), values.size), np.nan),
         spent,
         np.zeros(values.size, dtype=np.bool_),
@@ -226,12 +224,11 @@ def left_along(change: Array, before: Array, stays: float) -> Array:
 def _updated(found: Converged, lanes: Counts, now: Outcome, spent: Flat, error: Array) -> Converged:
     whole = lanes.size == found.settled.size
     everything = now if whole else found.outcome.replaced(lanes, now)
-    before = found.outcome if whole else found.before.replaced(lanes, found.outcome.of(lanes))
     errors, used_ = found.error.copy(), {name: column.copy() for name, column in found.used.items()}
     errors[:, lanes] = error
     for name, column in used_.items():
         column[lanes] = spent[name]
-    return replace(found, outcome=everything, before=before, error=errors, used=used_)
+    return replace(found, outcome=everything, error=errors, used=used_)
 
 
 def _march(
@@ -248,20 +245,20 @@ def _march(
 
 
 def left_by_elements(marches: Marches, found: Converged, share: Share) -> Array:
-    """(R, V) of every result that variants report, by what twice the elements change at the level before their last:
-    frequencies drift alike there, at a quarter of the work. NaN where no estimate exists; nothing where no body is cut
-    into elements. Raises Halted, and Crashed by the places of variants."""
+    """(R, V) of every result that variants report by the last of their levels, NaN where no estimate exists; nothing
+    where no body is cut into elements. Raises Halted, and Crashed by the places of variants.
+
+    By the level before, at a quarter of the work, 6 % of the errors of lone variants were told too small, not 1.5 %."""
     grid, values, levels, _ = marches
     error: Array = np.zeros((len(results_of(grid.asked)), values.size))
     if not grid.is_meshed:
         return error
     finer = Levels(tuple(numerics._replace(elements=2) for numerics in levels.numerics), levels.steps)
-    earlier = np.maximum(found.level - 1, 0)
-    for level in np.unique(earlier):
-        lanes = np.flatnonzero(earlier == level)
+    for level in np.unique(found.level):
+        lanes = np.flatnonzero(found.level == level)
         now, _ = _march(Marches(grid, values, finer), share, lanes, int(level))
-        model, before = grid.model(finer.numerics[level]), found.before.of(lanes)
-        error[:, lanes] = LEFT_BY_ELEMENTS * differences(grid.asked, model, values.part(lanes), before, now)
+        model, own = grid.model(finer.numerics[level]), found.outcome.of(lanes)
+        error[:, lanes] = LEFT_BY_ELEMENTS * differences(grid.asked, model, values.part(lanes), own, now)
     return np.where(np.isinf(error), np.nan, error)
 
 
