@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
-from engine.accuracy.choice import PILOTS, scenes_of_pilots, usual_pilots
+from engine.accuracy.choice import PILOTS, pilots_of, scenes_of_pilots, usual_pilots
 from engine.accuracy.groups import ConvergingGroup, Group
 from engine.batch.execution import warm_up
 from engine.batch.executors import Shared, Threads
@@ -20,8 +20,9 @@ from studies.results.places import spread
 SECONDS = 3.0  # that measuring may take
 PATIENCE = 10.0  # the same until some variants have converged: of a run of minutes nothing is known before
 ROUNDS = (16, 64, PILOTS)  # pilots, as long as the next round is expected to end in time
-# What is said of the next four was measured with the built-in studies on two threads; the spread is over these.
+# What is said of the next five was measured with the built-in studies on two threads; the spread is over these.
 CLIMB = 10.0  # times the convergence of a few variants that pilots take on the ladder: 2 to 23
+MARCHED = 0.07  # of that convergence that a scene's march takes by what pilots tell: of swept motions on frames
 BROKEN_OFF = 2.5  # times the seconds after which some pilots were broken off that all of them take: 2 to 3
 AUDIT = 1.7  # times that convergence that an audit takes, one level beyond it: 1.1 to 4.3
 UNFINISHED = 2.0  # times the seconds in which variants did not converge that they take
@@ -108,10 +109,11 @@ def _of_convergence(plan: Plan, looked: Looked, threads: int) -> Forecast:
 def _without_pilots(plan: Plan, looked: Looked, threads: int, tried: float) -> Forecast:
     """A study whose pilots take longer than there is time; tried: seconds after which some were broken off, 0 where
     there was no time to begin."""
-    pilots = usual_pilots(plan.size)
+    pilots = pilots_of(plan.cases, plan.members).size
     less = f"there was no time for pilots: a run measures {pilots}, and takes what they show to be enough"
-    scenes = scenes_of_pilots(len(plan.grids), plan.size, pilots)
+    scenes = scenes_of_pilots(len(plan.grids), plan.size, usual_pilots(plan.size))
     seconds = max(BROKEN_OFF * tried, CLIMB * looked.seconds * scenes / min(threads, scenes))
+    seconds += MARCHED * looked.seconds * len(plan.grids)
     if not looked.parts:
         return Forecast(plan, "", (), seconds, f"{less}; this may take longer")
     title = f"What {counted(len(looked.parts), 'variant')} converged with; a run takes no more than it needs"
@@ -135,24 +137,25 @@ def _choose(plan: Plan, threads: int, looked: Looked, end: float, rounds: Sequen
     if found is None:
         return _without_pilots(plan, looked, threads, tried)
     trial, pilots, took = found
-    usual = usual_pilots(plan.size)
-    more = "" if pilots >= usual else f"; a run measures {usual} and knows better"
-    title = f"What variants are computed with, by the measured errors of {min(pilots, usual)} pilots{more}"
+    usual, drawn = usual_pilots(plan.size), pilots_of(plan.cases, plan.members).size
+    more = "" if pilots >= usual else f"; a run measures {drawn} and knows better"
+    title = f"What variants are computed with, by the measured errors of {min(pilots, drawn)} pilots{more}"
     scenes, more_scenes = (
         scenes_of_pilots(len(plan.grids), plan.size, count) for count in (pilots, max(usual, pilots))
     )
     longer = more_scenes / scenes * max(1.0, usual * scenes / (pilots * more_scenes)) ** 0.5
-    seconds = took * longer + trial.seconds * _pace(trial) / threads
+    pace, tables = _pace(trial)
+    seconds = took * longer + (trial.seconds * pace + tables * len(trial.groups)) / threads
     return Forecast(trial, title, chosen.rows(chosen.chosen(trial)), seconds)
 
 
-def _pace(plan: Plan) -> float:
-    """Time of the march over the expected, by the group that takes most of it."""
+def _pace(plan: Plan) -> tuple[float, float]:
+    """Time of the march over the expected, by the group that takes most of it, and seconds that its tables take."""
     group = max(plan.groups, key=lambda group: group.seconds_per_variant * group.variants.size)
-    variants, took = group.variants[:TIMED], 0.0
+    variants, took = group.variants[:TIMED], list[float]()
     for _ in ("makes the tables", "marches"):
         started = time.perf_counter()
         group.found(plan.values(group, variants), variants, plan.choice, lambda: False)
-        took = time.perf_counter() - started
-    expected = group.seconds_per_variant * variants.size
-    return took / expected if expected > 0.0 else 1.0
+        took.append(time.perf_counter() - started)
+    expected, tables = group.seconds_per_variant * variants.size, max(0.0, took[0] - took[1])
+    return took[1] / expected if expected > 0.0 else 1.0, tables

@@ -115,5 +115,6 @@ def test_scenes_of_pilots_are_shared_out(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(forecasting, "_converge", lambda *_: Looked([], 2.0))
     monkeypatch.setattr(forecasting, "_audit", lambda *_: 0.0)
     monkeypatch.setattr(forecasting, "AROUND", 0.0)
-    assert forecast(found, 2, -1.0).seconds == 8 * forecasting.CLIMB * 2.0
-    assert forecast(found, 64, -1.0).seconds == forecasting.CLIMB * 2.0
+    marched = 40 * forecasting.MARCHED * 2.0
+    assert forecast(found, 2, -1.0).seconds == 8 * forecasting.CLIMB * 2.0 + marched
+    assert forecast(found, 64, -1.0).seconds == forecasting.CLIMB * 2.0 + marched
