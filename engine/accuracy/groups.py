@@ -160,6 +160,10 @@ class MarchGroup(Group):
         return self.grid.tables(self.model, self.by)
 
     @property
+    def steps(self) -> int:
+        return self.grid.unit * self.by * self.model.scheme.stride  # of no tables, which many scenes would have at once
+
+    @property
     def usual_steps(self) -> int:
         return self.steps
 
@@ -170,7 +174,7 @@ class MarchGroup(Group):
 
     @property
     def work(self) -> float:
-        return float(self.model.body_modes * self.tables.steps)
+        return float(self.model.body_modes * self.steps)
 
     def found(
         self,

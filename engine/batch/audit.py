@@ -140,8 +140,9 @@ def may_go_further(plan: Plan, variants: Counts, used: Flat) -> Mask:
     found = np.ones(variants.size, dtype=np.bool_)
     for grid, members in zip(plan.grids, plan.members, strict=True):
         own = np.flatnonzero(_among(variants, members, plan.size))
-        values = VariantValues.of(grid.scene.study, plan.cases, variants[own])
-        found[own] = ~is_last(grid, values, in_full(grid), {name: used[name][own] for name in USED})
+        if own.size:
+            values = VariantValues.of(grid.scene.study, plan.cases, variants[own])
+            found[own] = ~is_last(grid, values, in_full(grid), {name: used[name][own] for name in USED})
     return found
 
 

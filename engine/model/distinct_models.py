@@ -15,8 +15,9 @@ from results_schema.arrays import Counts, split
 
 def scenes(study: Study, cases: Cases, chosen: Counts) -> Iterator[tuple[SceneModel, Counts]]:
     """Distinct scenes of some variants, given by their flat numbers, with those that share each."""
+    base = study.without_sweep()
     for variants in split(chosen, structure(study, cases, chosen)):
-        own = cases.study_of(study, int(variants[0])) if structural(study, cases) else study.without_sweep()
+        own = cases.study_of(base, int(variants[0])) if structural(study, cases) else base
         values = VariantValues.of(own, cases, variants)
         timing = values.timing()
         columns = np.stack([column for pair in timing.values() for column in pair])

@@ -131,7 +131,7 @@ class Cases:
 
     def study_of(self, study: Study, index: int) -> Study:
         """One variant as a study of its own, without a sweep."""
-        return study.without_sweep().with_values(self.values_of(index))
+        return (study.without_sweep() if study.sweep.axes else study).with_values(self.values_of(index))
 
 
 def expand(study: Study) -> Cases:
