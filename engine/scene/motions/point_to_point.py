@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from functools import cached_property
-from typing import Literal
+from functools import cached_property, lru_cache
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import Field
 
 from engine.scene.motions.base import Array, Motion, Path, Side, two_places
@@ -74,17 +75,26 @@ class PointToPoint(Motion):
         return inside[(inside > 0.0) & (inside < self.duration)]
 
     def law(self, tau: Array, side: Side) -> Path:
-        """Its second half, and the rest, are the first one backward, so that it comes to rest exactly."""
-        times, way, scale = np.asarray(tau, dtype=np.float64), self.end - self.start, self.time_scale
-        reached = np.searchsorted(self._bounds, times, side=side)
+        times = np.asarray(tau, dtype=np.float64)
+        return self._in_phases(times, np.searchsorted(self._bounds, times, side=side))
+
+    def path_on(self, tau: ArrayLike, segment_start: float, segment_end: float) -> Path:
+        times = np.minimum(np.maximum(np.asarray(tau, dtype=np.float64), segment_start), segment_end)
+        middle = 0.5 * (segment_start + segment_end)  # all of it in one phase
+        return self._in_phases(times, np.searchsorted(self._bounds, middle))
+
+    def _in_phases(self, times: Array, reached: Any) -> Path:
+        """At times (S,) in phases (S,), or all in one. Its second half, and the rest, are the first one backward, so
+        that it comes to rest exactly."""
+        way, scale = self.end - self.start, self.time_scale
         first = np.searchsorted(self._bounds, 0.0, side="right")  # without a jerk the first phase takes no time
-        phase = np.clip(reached, first, PHASES - 1 if self.dwell > 0.0 else PHASES - 2 - first)
+        last = PHASES - 1 if self.dwell > 0.0 else PHASES - 2 - first
+        phase = np.minimum(np.maximum(reached, first), last)
         back = phase >= PHASES // 2
         k = np.where(back, np.maximum(PHASES - 2 - phase, 0), phase)
-        starts, own = self._move.pieces()[:, 0], self._move.pieces()[k, 1:]
+        starts, (c0, c1, c2, c3) = self._pieces[:, 0], np.moveaxis(self._pieces[k, 1:], -1, 0)
         since = np.where(back, self._move.duration - times * scale, times * scale)
-        u = np.clip(since, starts[k], starts[k + 1]) - starts[k]  # rounding must not leave the phase
-        c0, c1, c2, c3 = np.moveaxis(own, -1, 0)
+        u = np.minimum(np.maximum(since, starts[k]), starts[k + 1]) - starts[k]  # rounding must not leave the phase
         gone, rate = c0 + u * (c1 + u * (c2 + u * c3)), c1 + u * (2.0 * c2 + 3.0 * u * c3)
         push = np.where(back, -1.0, 1.0) * (2.0 * c2 + 6.0 * u * c3)
         place = np.where(back, self.end - way * gone, self.start + way * gone)
@@ -99,6 +109,17 @@ class PointToPoint(Motion):
         return profile(abs(self.end - self.start), self.speed, self.acceleration, jerk)
 
     @property
+    def _pieces(self) -> Array:
+        """(8, 5) as of `Profile`."""
+        return _tables(self._move)[0]
+
+    @property
     def _bounds(self) -> Array:
         """(7,) tau at which its phases end."""
-        return self._move.bounds / self.time_scale
+        return _tables(self._move)[1] / self.time_scale
+
+
+@lru_cache(maxsize=256)
+def _tables(move: Profile) -> tuple[Array, Array]:
+    """Its pieces and bounds, which every segment of every march asks for."""
+    return move.pieces(), move.bounds
