@@ -279,8 +279,8 @@ LEAST_IN_SCENE = 8  # pilots of a scene, where there are so many: about as many 
 MOST_UNHELD = 5e6  # modes x steps, about two milliseconds, that a variant takes whose tolerance nothing holds
 AT_ONCE = 65536  # variants that are chosen for at once: some ten milliseconds
 #: Scenes that pilots are drawn from, as each climbs the ladder by tables of its own, about a second; and where they
-#: have a few variants each, as of swept motions. By 32 of 512 such scenes of a beam and of a portal, three swept numbers,
-#: at 1e-2 and 1e-3, none of 40 variants missed, and 0 to 1.8 % of errors were told too small; with 24 drawn at random 2.6.
+#: have a few variants each, as of swept motions. By 32 of 512 such scenes of a beam and of a portal, three swept
+#: numbers, at 1e-2 and 1e-3, none of 40 variants missed, 0 to 1.8 % of errors were told too small; by 24 at random 2.6.
 MOST_SCENES, MOST_SMALL_SCENES, IN_SMALL_SCENES = 24, 64, 16
 
 
