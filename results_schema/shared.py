@@ -102,6 +102,8 @@ MARCH = outputs("""
     {sensor}_settling_time | | s | optional nan | settling time of {sensor}
         after all carriages have come to rest or left, until it stays within its settling_band of its static value; NaN
         where it has not settled a longest period, or two beats, before the end of the run
+    {sensor}_move_and_settle_time | | s | optional nan | time of move and settling of {sensor}
+        from time 0 until then: when all carriages have come to rest or left, and its settling time; NaN as that
     {carriage}_contact_force_max | | N | nan | largest contact force of {carriage}
         over its way, without the last 2 % of the track towards a held end; NaN where the carriage is never there
     {carriage}_contact_force_min | | N | nan | smallest contact force of {carriage}

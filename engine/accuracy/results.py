@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from engine.march.envelopes import envelope_names
+from engine.march.rest import names_of_times
 from engine.model.lane_table import weights
 from engine.observation.contact_forces import contacts_that_react
 from engine.observation.cycle_reduction import HISTORY_PART, Compared
@@ -122,8 +123,8 @@ def _of_sensors(asked: Asked) -> Iterator[Entry]:
         for own in (f"{name}_{end}_position" for end in ENDS):
             yield Result(own, name), partial(Pair.place, name=own)
         if sensor.settling_band is not None:
-            own = f"{name}_settling_time"
-            yield Result(own, name), partial(Pair.duration, name=own)
+            for own in names_of_times(name):
+                yield Result(own, name), partial(Pair.duration, name=own)
         if asked.keeps_histories:
             yield Result(name, name, *history), partial(Pair.history, sensor=j)
 

@@ -17,6 +17,7 @@ from engine.accuracy.shown import stations_shown
 from engine.batch.plan import NOBODY, Plan
 from engine.linear_algebra import one_thread
 from engine.march.outcome import USED, Flat, histories
+from engine.march.rest import names_of_times
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts
 from results_schema.errors import WorkersGaveUp
@@ -71,7 +72,7 @@ def told_errors(found: Found, results: tuple[Result, ...]) -> Array:
         if result.name.endswith("_position"):
             least = np.where(found.used["steps_used"] > 0, 1.0 / steps, 0.0)
             error[number] = np.minimum(np.maximum(error[number], least), 1.0)
-        if result.name.endswith("_settling_time"):
+        if result.name in names_of_times(result.of):
             unknown = np.isnan(found.outcome.numbers[result.name]) | (error[number] > MOST_OF_TIMES)
             error[number, unknown] = np.nan
     return error

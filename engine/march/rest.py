@@ -51,6 +51,11 @@ def settling(study: Study) -> list[str]:
     return [name for name, sensor in study.sensor.items() if sensor.settling_band is not None]
 
 
+def names_of_times(sensor: str) -> tuple[str, str]:
+    """The results that tell when a sensor has settled: after the stop, and since time 0."""
+    return f"{sensor}_settling_time", f"{sensor}_move_and_settle_time"
+
+
 def counts_settling(tables: SceneTables) -> Counts:
     """Stations by their count at which it is looked for when sensors have settled; none where that is not told."""
     if not (settling(tables.model.study) and tables.watches_rest):
@@ -60,8 +65,8 @@ def counts_settling(tables: SceneTables) -> Counts:
 
 def settling_times(tables: SceneTables, values: VariantValues, counts: Counts, history: Array) -> dict[str, Array]:
     """How long after all carriages have come to rest or left a sensor is off its static value by more than its band,
-    s; NaN where it still is within a period, or two beats, of the end, as it may swing out of it again. history (H, J,
-    V) of the sensors at stations by their count."""
+    s, and since time 0; NaN where it still is within a period, or two beats, of the end, as it may swing out of it
+    again. history (H, J, V) of the sensors at stations by their count."""
     own, found = counts_settling(tables), dict[str, Array]()
     if not own.size:
         return found
@@ -73,7 +78,9 @@ def settling_times(tables: SceneTables, values: VariantValues, counts: Counts, h
             when = last_beyond(off, band, seconds - seconds[0])
             may_swing = (off > STILL * band).any(axis=0)
             swings_on = may_swing & (seconds[-1] - seconds[0] - when < _longest_swing(tables, values, j))
-            found[f"{name}_settling_time"] = np.where(swings_on, np.nan, when)
+            settling_time, move_and_settle_time = names_of_times(name)
+            found[settling_time] = np.where(swings_on, np.nan, when)
+            found[move_and_settle_time] = seconds[0] + found[settling_time]
     return found
 
 

@@ -67,7 +67,7 @@ def _scales(results: Results, name: str, sensor: str) -> tuple[Any, Any]:
         return np.nan, results.of_sensor(name, sensor)
     if name == "lag":
         return _cruise(results), np.nan
-    if name.endswith("_settling_time"):
+    if name.endswith(("_settling_time", "_move_and_settle_time")):
         return np.nan, dataset[name]
     if f"{stem}_max" in dataset and f"{stem}_min" in dataset:
         return _scales_of_ends(results, stem, _largest([dataset[f"{stem}_max"], dataset[f"{stem}_min"]]))

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from engine.march.rest import names_of_times
 from engine.scene.study import Study
 from engine.study_file.spec import Spec
 from results_schema.arrays import Array
@@ -41,10 +42,17 @@ def residual_of(results: Results, sensor: str) -> Array:
     return np.where(results.with_values, values, np.nan)
 
 
-def settling_of(results: Results, sensor: str) -> Array:
-    """The settling time of a sensor, in the sweep's shape; NaN where it has not settled."""
-    values = results.dataset[f"{sensor}_settling_time"].transpose(*results.dims).values
+def settling_of(results: Results, name: str) -> Array:
+    """A settling time, or time of move and settling, in the sweep's shape; NaN where a sensor has not settled."""
+    values = results.dataset[name].transpose(*results.dims).values
     return np.where(results.with_values, values, np.nan)
+
+
+def moves_differ(results: Results, sensor: str) -> bool:
+    """Whether variants come to rest at different times, so that the shortest settling is not the shortest time."""
+    settling, whole = (settling_of(results, name) for name in names_of_times(sensor))
+    stops = (whole - settling)[np.isfinite(whole)]
+    return bool(stops.size > 1 and np.ptp(stops) > ROUNDING * stops.max())
 
 
 def quiet(results: Results, sensor: str) -> bool:
@@ -127,7 +135,7 @@ def _settled(results: Results, sensor: str) -> str:
     band = results.study.sensor[sensor].settling_band
     if band is None:
         return ""
-    values = settling_of(results, sensor)
+    values = settling_of(results, names_of_times(sensor)[0])
     left = int(np.count_nonzero(results.with_values & np.isnan(values)))
     place, units, said = extreme(values), results.sensors[sensor], list[str]()
     known = int(np.count_nonzero(np.isfinite(values)))
@@ -136,10 +144,24 @@ def _settled(results: Results, sensor: str) -> str:
     if place is not None and float(values[place]) == 0.0:
         said.append(f"{among}it is {within} from the stop on")
     elif place is not None:
-        took, error = float(values[place]), float(absolute_errors(results, f"{sensor}_settling_time")[place])
+        took, error = float(values[place]), float(absolute_errors(results, names_of_times(sensor)[0])[place])
         when = f"{quantity(took, 's')}{told_error(error, took, 's')} after the stop at the latest"
         said.append(f"{among}it has settled {within} {when}{in_words(results, place)}")
+    if moves_differ(results, sensor):
+        said.append(_shortest(results, sensor))
     if left:
         have = "have" if left > 1 else "has"
         said.append(f"{counted(left, 'variant')} {have} not settled by the end of the run: a longer rest tells when")
     return "".join(f"; {one}" for one in said)
+
+
+def _shortest(results: Results, sensor: str) -> str:
+    """The shortest time of move and settling."""
+    name = names_of_times(sensor)[1]
+    values = settling_of(results, name)
+    place = extreme(-values)
+    assert place is not None
+    took, error = float(values[place]), float(absolute_errors(results, name)[place])
+    return (
+        f"move and settling take {quantity(took, 's')}{told_error(error, took, 's')} at least{in_words(results, place)}"
+    )

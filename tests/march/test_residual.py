@@ -162,11 +162,17 @@ def test_when_it_has_settled(scheme: str) -> None:
         expected = times[np.flatnonzero(off > band)[-1]] - end
         found = engine.run(settles(band, solver=ONE_MODE | {"scheme": scheme}))
         assert float(found.midspan_settling_time) == pytest.approx(expected, abs=2e-4)
-        assert found.midspan_settling_time.attrs["units"] == "s"
+        assert float(found.midspan_move_and_settle_time) == pytest.approx(end + expected, abs=2e-4)
+        assert found.midspan_settling_time.attrs["units"] == found.midspan_move_and_settle_time.attrs["units"] == "s"
         told = float(found.estimated_error.sel(result="midspan_settling_time")) * expected
         assert abs(float(found.midspan_settling_time) - expected) <= told + 7e-5  # as far as the ODE tells it
-    assert np.isnan(float(engine.run(settles(1e-3)).midspan_settling_time))
-    assert float(engine.run(settles(0.5)).midspan_settling_time) == 0.0
+        of_both = float(found.estimated_error.sel(result="midspan_move_and_settle_time")) * (end + expected)
+        assert of_both == pytest.approx(told, rel=1e-3)
+    still = engine.run(settles(1e-3))
+    assert np.isnan(float(still.midspan_settling_time)) and np.isnan(float(still.midspan_move_and_settle_time))
+    at_once = engine.run(settles(0.5))
+    assert float(at_once.midspan_settling_time) == 0.0
+    assert float(at_once.midspan_move_and_settle_time) == pytest.approx(end, rel=1e-9)
 
 
 def test_settling_of_a_sweep_is_that_of_each_alone() -> None:

@@ -10,11 +10,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
+from engine.march.rest import names_of_times
 from results_schema.arrays import Array
 from studies.findings.absolute_errors import absolute_errors
 from studies.findings.beyond import Limits
 from studies.findings.effects import by_effect
-from studies.findings.residual import MOST_SENSORS, quiet, residual_of, ringing, settling_of
+from studies.findings.residual import MOST_SENSORS, moves_differ, quiet, residual_of, ringing, settling_of
 from studies.pictures.common.figures import (
     BLUE,
     Figure,
@@ -40,7 +41,7 @@ BAND = 0.3  # of their colour that bands have together
 
 class Row(NamedTuple):
     """A panel over the sweep: values and estimated errors in the sweep's shape, their unit, what stands beside the axis
-    in a unit, and a limit of the values."""
+    in a unit, a limit of the values, and where the axis begins (None: where they do)."""
 
     sensor: str
     values: Array
@@ -48,6 +49,7 @@ class Row(NamedTuple):
     units: str
     label: Callable[[str], str]
     limit: float | None = None
+    base: float | None = 0.0
 
 
 def pictures(results: Results, limits: Limits) -> list[Figure]:
@@ -84,23 +86,32 @@ def _residuals(results: Results, sensors: list[str], limits: Limits, fewer: int)
 
 
 def _settling(results: Results, sensors: list[str]) -> list[Figure]:
-    """Settling times over the sweep, of sensors that have a band and do not all settle at once."""
-    rows, bands = [], []
-    for sensor in sensors:
-        band, name = results.study.sensor[sensor].settling_band, f"{sensor}_settling_time"
-        if band is None or not np.nanmax(values := settling_of(results, sensor), initial=0.0) > 0.0:
-            continue
-        rows.append(Row(sensor, values, absolute_errors(results, name), "s", "settling time ({})".format))
-        bands.append(f"{sensor.replace('_', ' ')} {quantity(band, results.sensors[sensor])}")
-    if not rows:
+    """How long sensors take to settle, of those that have a band and do not all settle at once: since the beginning
+    where they come to rest at different times."""
+    known = results.study.sensor
+    told = [sensor for sensor in sensors if known[sensor].settling_band is not None]
+    told = [one for one in told if np.nanmax(settling_of(results, names_of_times(one)[0]), initial=0.0) > 0.0]
+    if not told:
         return []
-    longest = quantity(float(np.nanmax(rows[0].values)), "s")
+    with_move = any(moves_differ(results, sensor) for sensor in told)
+    label, since = ("time of move and settling ({})", "beginning") if with_move else ("settling time ({})", "stop")
+    rows, bands = list[Row](), list[str]()
+    for sensor in told:
+        name = names_of_times(sensor)[with_move]
+        base = None if with_move else 0.0
+        errors = absolute_errors(results, name)
+        rows.append(Row(sensor, settling_of(results, name), errors, "s", label.format, base=base))
+        bands.append(f"{sensor.replace('_', ' ')} {quantity(float(known[sensor].settling_band or 0.0), 'm')}")
+    longest, least = (quantity(float(end(rows[0].values)), "s") for end in (np.nanmax, np.nanmin))
     caption = (
-        f"Time after the stop until the reading stays within the band of its static value: {listed(bands)}.",
+        f"Time since the {since} until the reading stays within the band of its static value: {listed(bands)}.",
+        f"The shortest is {least}." if with_move else "",
         "Gaps: not settled by the end of the run." if any(np.isnan(row.values).any() for row in rows) else "",
     )
-    takes = f"{rows[0].sensor.replace('_', ' ')} takes up to {longest} to settle"
-    return _over_sweep(results, "settling", rows, takes, caption)
+    first = told[0].replace("_", " ")
+    takes = f"move and settling of {first} take" if with_move else f"{first} takes"
+    settles = "" if with_move else " to settle"
+    return _over_sweep(results, "settling", rows, f"{takes} up to {longest}{settles}", caption)
 
 
 def _over_sweep(results: Results, name: str, rows: list[Row], title: str, words: Sequence[str]) -> list[Figure]:
@@ -153,7 +164,7 @@ def _draw_row(axes: Axes, seen: View, row: Row) -> None:
         limit_line(axes, limit * scale.factor, said, "left")
     elif limit is not None:
         limit_far(axes, f"{said}, beyond this panel")
-    axes.set_ylim(0.0, None)
+    axes.set_ylim(row.base, None)
 
 
 def _over_time(results: Results, sensors: list[str], shown: list[Index]) -> Figure:
