@@ -16,7 +16,7 @@ from studies.findings.amplification import largest, sizes
 from studies.protocol.study import kind_named, question_of
 from studies.results.axes import PACES, VARIANT, Axis
 from studies.results.findings_common import LOOSE
-from studies.results.formatting import counted, listed, quantity
+from studies.results.formatting import counted, listed, number, quantity
 from studies.results.results import Results
 
 MOST_PARTS = 8  # of a sweep that are told one by one
@@ -24,6 +24,7 @@ MOST_APART = 3  # of them that are told each with what else is swept
 MOST_TOLD = 3  # values of another swept number that are told one by one
 GAP = 3.0  # times the usual distance of two values of a sweep
 NEARLY = 0.9  # of a limit that is exceeded nowhere: between swept values it may well be
+UNLIKE = 1e-4  # of a limit: what stays below is a limit in another unit, such as 3 for 3 um
 LIMIT = " Its absolute value exceeds "
 LIMITED = (
     *("displacement", "velocity", "acceleration", "bending_moment", "stress", "support_reaction"),
@@ -83,7 +84,17 @@ def told_limit(
     doubt = "" if surely == said == perhaps else f"; with its estimated error perhaps {perhaps}, surely {surely}"
     top = float(np.nanmax(np.where(results.with_values, values, np.nan), initial=0.0))
     near = f"; at most it is {quantity(top, units)}" if said.startswith("nowhere") and top > NEARLY * limit else ""
-    return f"{LIMIT}{quantity(limit, units)} {said}{near}{doubt}{_told_opened(results, values > limit)}."
+    named, opened = f"{quantity(limit, units)}{out_of_reach(limit, top)}", _told_opened(results, values > limit)
+    return f"{LIMIT}{named} {said}{near}{doubt}{opened}."
+
+
+def out_of_reach(limit: float, top: float) -> str:
+    """A doubt about a limit's unit where the largest value is nothing beside it; "" elsewhere.
+
+    >>> out_of_reach(3.0, 2e-6), out_of_reach(3e-6, 2e-6)
+    (' (1.5e6 times the largest value: is its unit right?)', '')
+    """
+    return f" ({number(limit / top)} times the largest value: is its unit right?)" if 0.0 < top < limit * UNLIKE else ""
 
 
 def _told_opened(results: Results, beyond: Mask) -> str:

@@ -8,7 +8,7 @@ from engine.study_file.spec import Spec
 from results_schema.arrays import Array
 from studies.findings.absolute_errors import absolute_errors, told_error
 from studies.findings.amplification import only_rounding, sizes
-from studies.findings.beyond import LIMITED, Limits, in_turns, where_beyond
+from studies.findings.beyond import LIMITED, Limits, in_turns, out_of_reach, where_beyond
 from studies.findings.effects import by_effect
 from studies.results.axes import VARIANT
 from studies.results.findings_common import in_words
@@ -108,7 +108,7 @@ def _residual(results: Results, sensor: str, limits: Limits) -> str:
         return f"{said}{settled}.{between}"
     axis = next(iter(by_effect(results, values)), None)
     over = f" of {axis.noun}" if axis is not None and axis.dim != VARIANT else ""
-    beyond = f"{quantity(limit, units)} {where_beyond(results, values, limit, axis)}"
+    beyond = f"{quantity(limit, units)}{out_of_reach(limit, size)} {where_beyond(results, values, limit, axis)}"
     return f"{said}; it exceeds {beyond}{over}{settled}.{between}"
 
 

@@ -142,6 +142,15 @@ def test_no_variant_beyond_a_limit_is_said_so() -> None:
     assert said.endswith("it exceeds 1 m nowhere from 2 m/s² to 30 m/s² of acceleration.")
 
 
+def test_a_limit_in_another_unit_is_doubted() -> None:
+    """3000 for 3000 um, of residual vibrations and of readings."""
+    found = studies.run(stops(question={"displacement": 3000.0, "residual": {"displacement": 3000.0}}))
+    doubt = re.compile(r"exceeds 3000 m \((\d+) times the largest value: is its unit right\?\) nowhere")
+    told = [float(seen[1]) for text in answers.answer(found) if (seen := doubt.search(text))]
+    largest = found.midspan_residual.max(), found.midspan_max.max()
+    assert told == pytest.approx([3000.0 / float(size) for size in largest], rel=5e-3)
+
+
 def test_what_is_not_asked_is_not_told() -> None:
     found = studies.run(stops(output={"histories": "none"}))
     assert not [name for name in found.variables if "residual" in str(name)]
