@@ -255,7 +255,10 @@ def _range(study_results: Results, name: str, sensor: str, array: xr.DataArray) 
     errors = absolute_errors(study_results, name, sensor) if array.dims == study_results.dims else None
     if "position" in array.dims:
         errors = errors_along(study_results, name)
-    smallest, largest = (_extreme(study_results, array, pick(values), errors) for pick in (np.nanargmin, np.nanargmax))
+    ends = [np.nanargmin(values), np.nanargmax(values)]
+    if errors is not None and np.isfinite(errors).any() and np.nanmin(values) == np.nanmax(values):
+        ends = [np.nanargmax(errors)] * 2  # of one value that is the same everywhere the largest error is told
+    smallest, largest = (_extreme(study_results, array, end, errors) for end in ends)
     kept = np.asarray(study_results.kept.values)
     having = (int(np.isfinite(values[kept]).sum()), int(kept.sum())) if array.dims == study_results.dims else (0, 0)
     percentiles = np.nanpercentile(values, study_results.study.output.percentiles)

@@ -14,7 +14,8 @@ from studies.reporting.comparison import compare
 from studies.reporting.summary import Range, in_tables
 from studies.results.findings_common import remedy
 from studies.results.results import Results
-from tests.engine.build import mass
+from tests.engine import build
+from tests.engine.build import beam, cruise, mass
 from tests.observation.test_off_track import study
 from tests.studies import scenes
 
@@ -153,3 +154,14 @@ def test_to_lie_within_errors_larger_than_the_values_says_nothing(error: float, 
     told = next(one for one in result.differences if one.name == "midspan_max")
     assert result.agree and told.beyond == 0
     assert told.blurred == says_nothing and told.allowed > 2.0 * error * 0.5 * abs(told.largest)
+
+
+def test_of_a_value_that_is_the_same_everywhere_the_largest_error_is_told() -> None:
+    """Statics that a study asks for do not change with the speed; how far from them the bed is does."""
+    speeds = {"speed": {"of": "carriage.car.motion.speed", "from": 0.1, "to": 1.5, "count": 5}}
+    solver = {"fidelity": "static", "audit": 0}
+    found = studies.run(build.study(beam(), mass(0.3, cruise(0.0, 1.0, 1.0)), solver=solver, sweep=speeds))
+    error = found.estimated_error.sel(result="midspan_max").values
+    (top,) = (one for one in in_tables(Results.of(found)) if one.name == "midspan_max")
+    assert top.is_constant and top.is_loose and error[0] < 0.1 < error.max()
+    assert top.extreme.error == pytest.approx(error.max() * float(found.midspan_max[0]), rel=1e-6)
