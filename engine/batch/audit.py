@@ -192,7 +192,7 @@ class _Audited(NamedTuple):
         same = [self.truth.used[name][lanes] == archived.used[name] for name in USED]
         known &= ~np.all(same, axis=0)  # a march is no second source of itself
         observed = differences(plan.asked, of.scene, values, archived.outcome, true)
-        told = told_errors(archived, results_of(plan.asked))
+        told = told_errors(archived, plan.asked)
         return Audit(own[known], observed[:, known], told[:, known], self.truth.error[:, lanes[known]], 0)
 
 

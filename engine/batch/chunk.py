@@ -3,7 +3,7 @@ what stands in an archive of variants that end every process that computes them:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -16,7 +16,7 @@ from engine.accuracy.results import Result, results_of, worst_held
 from engine.accuracy.shown import stations_shown
 from engine.batch.plan import NOBODY, Plan
 from engine.linear_algebra import one_thread
-from engine.march.outcome import USED, Flat, histories
+from engine.march.outcome import USED, Asked, Flat, Outcome, histories
 from engine.march.rest import names_of_times
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts
@@ -46,7 +46,7 @@ def run_chunk(
     kept = np.flatnonzero(np.isin(variants, plan.shown))
     found = group.found(values, variants, plan.choice, halted, shown=kept)
     results = results_of(plan.asked)
-    error, status = told_errors(found, results), _status(plan, group, found)
+    error, status = told_errors(found, plan.asked), _status(plan, group, found)
     missing = lost(status)
     error[:, missing] = np.nan
     flat = dict(found.outcome.numbers) | {
@@ -63,19 +63,30 @@ def run_chunk(
     return flat, joined([*known, *again])
 
 
-def told_errors(found: Found, results: tuple[Result, ...]) -> Array:
-    """(R, V) the estimated errors; of places no less than a step is long, and no more than the track; NaN of times that
-    are not known, and where neighbours settle a swing apart, so that nothing is told."""
-    error = np.where(np.isfinite(found.error), found.error, np.nan)
+def told_errors(found: Found, asked: Asked) -> Array:
+    """(R, V) the estimated errors; of places no less than a step is long, and no more than the track; of times that
+    sensors take to settle as `_told_of_times` has them."""
+    error, results = np.where(np.isfinite(found.error), found.error, np.nan), results_of(asked)
     steps = np.maximum(found.used["steps_used"], 1)
     for number, result in enumerate(results):
         if result.name.endswith("_position"):
             least = np.where(found.used["steps_used"] > 0, 1.0 / steps, 0.0)
             error[number] = np.minimum(np.maximum(error[number], least), 1.0)
-        if result.name in names_of_times(result.of):
-            unknown = np.isnan(found.outcome.numbers[result.name]) | (error[number] > MOST_OF_TIMES)
-            error[number, unknown] = np.nan
+    _told_of_times(found.outcome, asked, {result.name: error[n] for n, result in enumerate(results)})
     return error
+
+
+def _told_of_times(outcome: Outcome, asked: Asked, error: Mapping[str, Array]) -> None:
+    """Errors (V,) by result, changed in place: none of a sensor that surely stays within its band from the stop on; no
+    estimate where it does not settle, or where neighbours do a swing apart, so that nothing is told."""
+    for j, (name, sensor) in enumerate(asked.study.sensor.items()):
+        if sensor.settling_band is None:
+            continue
+        swings = outcome.numbers[f"{name}_residual"] + error[f"{name}_residual"] * outcome.scale[:, j]
+        for own in names_of_times(name):
+            unknown = np.isnan(outcome.numbers[own]) | (error[own] > MOST_OF_TIMES)
+            error[own][unknown] = np.nan
+            error[own][swings < sensor.settling_band] = 0.0
 
 
 def _worst(error: Array, results: tuple[Result, ...]) -> Array:

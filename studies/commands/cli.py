@@ -125,9 +125,7 @@ def run(study: str, archive: Path | None, as_json: bool, verbose: bool, **how: A
         chosen = choices.as_json(Results.of(outcome.results))
         console.say_json(summary.as_json(outcome, code) | {"choice": chosen})
     else:
-        screens.show_outcome(outcome)
-        if verbose:
-            screens.show_details(outcome)
+        (screens.show_details if verbose else screens.show_outcome)(outcome)
     return code
 
 

@@ -11,7 +11,7 @@ from results_schema.status import Status, label
 from studies.commands.console import blank, heading, paragraphs, say, table, warn
 from studies.findings.numerics_used import is_marched, told_choices
 from studies.protocol.study import kind_named
-from studies.reporting.answers import answer_of
+from studies.reporting.answers import answer_of, found_of, left_out_of_answer
 from studies.results.cells import percentile_spans
 from studies.results.findings_common import missed_most, remedy
 from studies.results.formatting import counted, listed, number, quantity, spanned
@@ -122,30 +122,40 @@ def show_outcome(outcome: Outcome) -> None:
 
     results = Results.of(outcome.results)
     heading(outcome.results.attrs["title"])
-    paragraphs(*answer_of(results))
+    said, left = answer_of(results), left_out_of_answer(results)
+    paragraphs(*said, *([f"{counted(left, 'more sentence')}: run -v, or the report."] if left else []))
     if not summary.is_measured(outcome.results):  # the grid of those that measure is of methods: its ends say nothing
         _ranges(summary.in_tables(results), results.percentiles, summary.every(results))
         _percentiles(results, [_name(one) for one in summary.in_tables(results)][:MOST_ROWS])
+    _show_accuracy(outcome, results)
+
+
+def _show_accuracy(outcome: Outcome, results: Results, *details: str) -> None:
+    """How exact it is, further sentences, and what to do next."""
     accuracy = told_accuracy(outcome.audit, results)
     paragraphs(*_about_statuses(results), *([f"Accuracy: {accuracy}"] if accuracy else []))
-    paragraphs(*told_unreduced(outcome.unreduced))
+    paragraphs(*told_unreduced(outcome.unreduced), *details)
     paragraphs(f"{_about_work(outcome)}. Next: wanderlast report {outcome.archive}")
 
 
 def show_details(outcome: Outcome) -> None:
-    """How a run was computed: the range of every result that people read with both variants, models, schemes, work, and
-    the audit."""
+    """In place of that all sentences, the range of every result that people read with both variants, and how a run was
+    computed: models, schemes, work, and the audit."""
     from studies.reporting import summary
 
     results = Results.of(outcome.results)
+    heading(outcome.results.attrs["title"])
+    paragraphs(*found_of(results))
     rows = [
         (_name(found), found.said(end), "" if found.is_constant else end.where)
         for found in summary.shown(results)
         for end in ((found.largest,) if found.is_constant else (found.smallest, found.largest))
     ]
-    blank()
-    table("Smallest and largest of results", ("result", "value", "where"), rows)
-    paragraphs(*told_choices(results), *told_audit(outcome.audit, results))
+    if not summary.is_measured(outcome.results):
+        blank()
+        table("Smallest and largest of results", ("result", "value", "where"), rows)
+        _percentiles(results, [_name(one) for one in summary.shown(results)])
+    _show_accuracy(outcome, results, *told_choices(results), *told_audit(outcome.audit, results))
 
 
 def _ranges(found: Sequence[Range], percentiles: Sequence[float], every: str) -> None:

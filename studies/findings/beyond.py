@@ -10,7 +10,7 @@ from pydantic import Field
 from engine.scene.sensors import Sensor
 from engine.scene.study import Study
 from engine.study_file.spec import Spec
-from engine.study_file.units import Acceleration, Dimensionless, Force, Length, Pressure, Speed, Torque
+from engine.study_file.units import Acceleration, Dimensionless, Force, Length, Pressure, Speed, Time, Torque
 from results_schema.arrays import Array, Mask
 from studies.findings.amplification import largest, sizes
 from studies.protocol.study import kind_named, question_of
@@ -51,13 +51,20 @@ class Limits(Spec):
         return None if sensor.is_dynamic_part else self.limit(sensor.quantity)
 
 
-class AskedOfPassages(Limits):
+class AskedOfRest(Spec):
+    """What a table [question] asks of the time after all carriages have come to rest or left. residual: limits of
+    residual vibrations, settling_time: of how long sensors take to settle, of which is told where they are exceeded."""
+
+    residual: Limits = Limits()
+    settling_time: Annotated[Time, Field(gt=0)] | None = None
+
+
+class AskedOfPassages(Limits, AskedOfRest):
     """The table [question] of a passage. amplification: dynamic over static, of which is told at which speeds it is
-    exceeded; the limits: of absolute values, of which the same is told for every sensor of that quantity; residual: of
-    residual vibrations; dynamic_part: of sensors that read no more than that."""
+    exceeded; the limits: of absolute values, of which the same is told for every sensor of that quantity; dynamic_part:
+    of sensors that read no more than that."""
 
     amplification: Annotated[Dimensionless, Field(gt=0)] = 1.1
-    residual: Limits = Limits()
     dynamic_part: Limits = Limits()
 
     def of(self, sensor: Sensor) -> float | None:

@@ -2,15 +2,14 @@
 
 import numpy as np
 
-from engine.march.rest import names_of_times
+from engine.march.rest import names_of_times, settling
 from engine.scene.study import Study
-from engine.study_file.spec import Spec
 from results_schema.arrays import Array
 from studies.findings.absolute_errors import absolute_errors, told_error
 from studies.findings.amplification import only_rounding, sizes
-from studies.findings.beyond import LIMITED, Limits, in_turns, out_of_reach, where_beyond
+from studies.findings.beyond import LIMITED, AskedOfRest, Limits, in_turns, out_of_reach, where_beyond
 from studies.findings.effects import by_effect
-from studies.results.axes import VARIANT
+from studies.results.axes import VARIANT, Axis
 from studies.results.findings_common import in_words
 from studies.results.formatting import ROUNDING, counted, quantity
 from studies.results.places import Index, extreme
@@ -22,18 +21,14 @@ FEWEST = 6  # of these
 LEAST_STEP = 0.1  # of the largest value: smaller ones do not count as up or down
 
 
-class AskedOfRest(Spec):
-    """The table [question] of a trajectory. residual: limits of residual vibrations, of which is told where they are
-    exceeded."""
-
-    residual: Limits = Limits()
-
-
-def check_residual(study: Study, limits: Limits) -> None:
-    """Refuse limits of residual vibrations that are not told. Raises BadInput."""
-    if any(limits.limit(name) is not None for name in LIMITED) and not study.output.residual:
+def check_residual(study: Study, asked: AskedOfRest) -> None:
+    """Refuse limits of residual vibrations and settling times that are not told. Raises BadInput."""
+    if any(asked.residual.limit(name) is not None for name in LIMITED) and not study.output.residual:
         what = "a limit of residual vibrations, which this study does not tell"
         raise study.source.fault("question.residual", what, expected="[output] residual = true beside it")
+    if asked.settling_time is not None and not settling(study):
+        what = "a limit of settling times, of which no sensor has one"
+        raise study.source.fault("question.settling_time", what, expected="a settling_band of a sensor")
 
 
 def residual_of(results: Results, sensor: str) -> Array:
@@ -78,9 +73,9 @@ def has_whole(results: Results, name: str) -> bool:
     return known[name].is_dynamic_part and results.place(name) in map(results.place, wholes)
 
 
-def residuals(results: Results, limits: Limits) -> list[str]:
+def residuals(results: Results, asked: AskedOfRest) -> list[str]:
     """The largest residual vibration of sensors, and where limits are exceeded."""
-    return [_residual(results, sensor, limits) for sensor in ringing(results, limits)[:MOST_SENSORS]]
+    return [_residual(results, sensor, asked) for sensor in ringing(results, asked.residual)[:MOST_SENSORS]]
 
 
 def most_ringing(results: Results) -> list[Index]:
@@ -89,7 +84,7 @@ def most_ringing(results: Results) -> list[Index]:
     return [place for place in places if place is not None]
 
 
-def _residual(results: Results, sensor: str, limits: Limits) -> str:
+def _residual(results: Results, sensor: str, asked: AskedOfRest) -> str:
     units, values = results.sensors[sensor], residual_of(results, sensor)
     place = extreme(values)
     if place is None:
@@ -102,11 +97,11 @@ def _residual(results: Results, sensor: str, limits: Limits) -> str:
         f"{sensor}: at rest it still swings by up to {quantity(size, units)}"
         f"{told_error(error, size, units)}{in_words(results, place)}"
     )
-    limit, settled = limits.of(results.study.sensor[sensor]), _settled(results, sensor)
+    axis = next(iter(by_effect(results, values)), None)
+    limit, settled = asked.residual.of(results.study.sensor[sensor]), _settled(results, sensor, asked, axis)
     between = _told_between(results, values, place)
     if limit is None:
         return f"{said}{settled}.{between}"
-    axis = next(iter(by_effect(results, values)), None)
     over = f" of {axis.noun}" if axis is not None and axis.dim != VARIANT else ""
     beyond = f"{quantity(limit, units)}{out_of_reach(limit, size)} {where_beyond(results, values, limit, axis)}"
     return f"{said}; it exceeds {beyond}{over}{settled}.{between}"
@@ -130,8 +125,9 @@ def _told_between(results: Results, values: Array, place: Index) -> str:
     return ""
 
 
-def _settled(results: Results, sensor: str) -> str:
-    """How long a sensor takes to settle at most, and how many variants have not by the end of their runs."""
+def _settled(results: Results, sensor: str, asked: AskedOfRest, axis: Axis | None) -> str:
+    """How long a sensor takes to settle at most, where along a swept number that is longer than is asked, and how many
+    variants have not by the end of their runs."""
     band = results.study.sensor[sensor].settling_band
     if band is None:
         return ""
@@ -147,6 +143,9 @@ def _settled(results: Results, sensor: str) -> str:
         took, error = float(values[place]), float(absolute_errors(results, names_of_times(sensor)[0])[place])
         when = f"{quantity(took, 's')}{told_error(error, took, 's')} after the stop at the latest"
         said.append(f"{among}it has settled {within} {when}{in_words(results, place)}")
+    if asked.settling_time is not None:
+        longer = where_beyond(results, np.where(np.isnan(values), np.inf, values), asked.settling_time, axis)
+        said.append(f"it takes longer than {quantity(asked.settling_time, 's')} {longer}")
     if moves_differ(results, sensor):
         said.append(_shortest(results, sensor))
     if left:

@@ -62,7 +62,7 @@ class Passage(Kind):
         """Something moves and something is measured."""
         first_carriage(study)
         check_sensors(study)
-        check_residual(study, question_of(study, AskedOfPassages).residual)
+        check_residual(study, question_of(study, AskedOfPassages))
 
     def summarise(self, dataset: xr.Dataset, study: Study) -> xr.Dataset:
         return with_amplification(dataset, study)
@@ -83,7 +83,7 @@ class Passage(Kind):
         opened = _opened(results)
         lifted = [_lifted(results, opened)] if opened else []
         kept = [_closed(results, name, force) for name, force in _contact_forces(results) if name not in opened]
-        residual = residuals(results, question_of(results.study, AskedOfPassages).residual)
+        residual = residuals(results, question_of(results.study, AskedOfPassages))
         return [*residual[:1], *said[:1], *lifted, *residual[1:], *said[1:], *kept, *told_statuses(results)]
 
     def named(self, results: Results) -> list[Index]:
@@ -255,8 +255,8 @@ def _value(results: Results, sensor: str, place: Index) -> str:
     at = float(results.dataset[f"{sensor}_{side}_position"].values[place])
     then = f" with {results.carriage_name} at {quantity(at, 'm')}" if np.isfinite(at) else ""
     loosely = uncertainty(results, f"{sensor}_{side}", place)
-    size = " in magnitude" * (sides[side] < 0.0)
-    return f"{quantity(sides[side], results.sensors[sensor])}{size}{loosely}{then}"
+    upward = " (largest in magnitude)" * (sides[side] < 0.0)
+    return f"{quantity(sides[side], results.sensors[sensor])}{upward}{loosely}{then}"
 
 
 def _contact_forces(results: Results) -> Iterator[tuple[str, Array]]:

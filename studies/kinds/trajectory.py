@@ -7,8 +7,8 @@ import numpy as np
 from engine.scene.study import Study
 from results_schema.variable import outputs
 from results_schema.variables import MARCH, declare
-from studies.findings.beyond import of_every_quantity
-from studies.findings.residual import AskedOfRest, check_residual, most_ringing, residuals
+from studies.findings.beyond import AskedOfRest, of_every_quantity
+from studies.findings.residual import check_residual, most_ringing, residuals
 from studies.protocol.study import Kind, question_of
 from studies.results.findings_common import check_sensors, first_carriage, over_all, told_statuses, uncertainty
 from studies.results.formatting import counted, quantity, spanned
@@ -44,7 +44,7 @@ class Trajectory(Kind):
         """Something moves, something is measured, and histories are kept."""
         first_carriage(study)
         check_sensors(study)
-        check_residual(study, question_of(study, AskedOfRest).residual)
+        check_residual(study, question_of(study, AskedOfRest))
         if study.output.histories == "none":
             raise study.source.fault(
                 "output.histories",
@@ -59,7 +59,7 @@ class Trajectory(Kind):
 
     def findings(self, results: Results) -> list[str]:
         traced = results.traced()
-        said = residuals(results, question_of(results.study, AskedOfRest).residual)
+        said = residuals(results, question_of(results.study, AskedOfRest))
         said += [_span(results, sensor) for sensor in of_every_quantity(results, MOST_SENSORS)]
         return [*said, _kept(results) if traced else "No history was kept.", *told_statuses(results)]
 

@@ -72,7 +72,7 @@ def pictures(results: Results) -> list[Figure]:
     found = [*first, *on_the_way, *others]
     if level and found:
         found[0] = replace(found[0], caption=" ".join([found[0].caption, *level]))
-    return [*residual.pictures(results, limits.residual), *found]
+    return [*residual.pictures(results, limits), *found]
 
 
 def _top(results: Results, sensor: str) -> Index:

@@ -8,8 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from studies.findings.amplification import sizes
-from studies.findings.beyond import of_every_quantity
-from studies.findings.residual import AskedOfRest
+from studies.findings.beyond import AskedOfRest, of_every_quantity
 from studies.pictures.common import residual
 from studies.pictures.common.figures import MUTED, Figure, draw, legend_of_all, shades, widen
 from studies.pictures.common.sweep_view import Curve, coincide
@@ -28,7 +27,7 @@ MOST_ALIKE = 3.0  # longest over shortest history that can share an axis of seco
 def pictures(results: Results) -> list[Figure]:
     """The sensors, then the carriages' own motion, over time, where histories were kept, then what rings on, where that
     is told."""
-    rest = residual.pictures(results, question_of(results.study, AskedOfRest).residual)
+    rest = residual.pictures(results, question_of(results.study, AskedOfRest))
     return [*_over_time(results), *rest] if results.traced() else rest
 
 

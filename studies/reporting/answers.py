@@ -31,8 +31,16 @@ def figures(dataset: xr.Dataset) -> list[Figure]:
 
 def answer_of(results: Results) -> list[str]:
     """The answer in two to five sentences: what the kind of study says first."""
-    told = _findings(results)
-    return [text for text in told if text not in told_statuses(results)][:MOST_SAID]
+    return _answers(results)[:MOST_SAID]
+
+
+def left_out_of_answer(results: Results) -> int:
+    """How many further sentences there are, with those on envelopes."""
+    return len(found_of(results)) - len(_findings(results)) + len(_answers(results)[MOST_SAID:])
+
+
+def _answers(results: Results) -> list[str]:
+    return [text for text in _findings(results) if text not in told_statuses(results)]
 
 
 def findings_of(results: Results) -> list[str]:

@@ -58,10 +58,11 @@ def test_errors_are_told_of_every_result() -> None:
 
 def test_places_are_off_by_a_step_at_least_and_by_the_track_at_most() -> None:
     """Whatever the margins of a choice say; other errors are as they are."""
-    results = results_of(make_plan(passages(2, 2)).asked)
+    asked = make_plan(passages(2, 2)).asked
+    results = results_of(asked)
     error = np.array([[75.0, 0.0, 0.0]] * len(results))
     used = {"steps_used": np.array([100, 100, 0])}
-    found = told_errors(Found(None, used, error, error[0]), results)  # type: ignore[arg-type]
+    found = told_errors(Found(None, used, error, error[0]), asked)  # type: ignore[arg-type]
     for result, own in zip(results, found, strict=True):
         assert own.tolist() == ([1.0, 0.01, 0.0] if result.name.endswith("_position") else [75.0, 0.0, 0.0])
 

@@ -159,7 +159,7 @@ def errors_of(plan: Plan, variants: Counts) -> Iterator[tuple[Result, Array]]:
             finer = Levels(tuple(one._replace(elements=TIMES) for one in levels.numerics), levels.steps)
             truth = converge(Marches(group.grid, values, finer), PART)
             true = differences(plan.asked, group.scene, values, now.outcome, truth.outcome)
-            found.append(np.stack([told_errors(now, results_of(plan.asked)), true, truth.error], axis=1))
+            found.append(np.stack([told_errors(now, plan.asked), true, truth.error], axis=1))
     for result, errors in zip(results_of(plan.asked), np.concatenate(found, axis=2), strict=True):
         if not result.name.endswith("_position"):
             yield result, errors

@@ -88,7 +88,7 @@ def test_values_below_zero_are_told_to_be_magnitudes() -> None:
     dataset = passage([0.0] * 4)
     dataset["midspan_min"].values[:] = -1e-3 * np.array([1.0, 2.0, 3.0, 2.5])
     said = next(text for text in answers.answer(dataset) if text.startswith("midspan"))
-    assert f"the largest displacement at 5 m of bed is {quantity(-3e-3, 'm')} in magnitude" in said
+    assert f"the largest displacement at 5 m of bed is {quantity(-3e-3, 'm')} (largest in magnitude)" in said
 
 
 def test_one_place_is_not_told_twice() -> None:

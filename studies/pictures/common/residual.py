@@ -13,7 +13,7 @@ from matplotlib.figure import Figure as Drawing
 from engine.march.rest import names_of_times
 from results_schema.arrays import Array
 from studies.findings.absolute_errors import absolute_errors
-from studies.findings.beyond import Limits
+from studies.findings.beyond import AskedOfRest, Limits
 from studies.findings.effects import by_effect
 from studies.findings.residual import MOST_SENSORS, moves_differ, quiet, residual_of, ringing, settling_of
 from studies.pictures.common.figures import (
@@ -52,18 +52,18 @@ class Row(NamedTuple):
     base: float | None = 0.0
 
 
-def pictures(results: Results, limits: Limits) -> list[Figure]:
+def pictures(results: Results, asked: AskedOfRest) -> list[Figure]:
     """Over the sweep and over time, of sensors that swing on, and how long they take to settle; none where the study
     does not tell it."""
-    known = (sensor for sensor in ringing(results, limits) if np.isfinite(residual_of(results, sensor)).any())
+    known = (sensor for sensor in ringing(results, asked.residual) if np.isfinite(residual_of(results, sensor)).any())
     told = [sensor for sensor in known if not quiet(results, sensor)]
     if not told:
         return []
     sensors, values = told[:MOST_SENSORS], residual_of(results, told[0])
     shown = picked(results, values, MOST_HISTORIES)
-    over_sweep = _residuals(results, sensors, limits, len(told) - len(sensors))
+    over_sweep = _residuals(results, sensors, asked.residual, len(told) - len(sensors))
     over_time = [_over_time(results, sensors, shown)] if shown else []
-    return [*over_sweep, *_settling(results, sensors), *over_time]
+    return [*over_sweep, *_settling(results, sensors, asked), *over_time]
 
 
 def _residuals(results: Results, sensors: list[str], limits: Limits, fewer: int) -> list[Figure]:
@@ -85,7 +85,7 @@ def _residuals(results: Results, sensors: list[str], limits: Limits, fewer: int)
     return _over_sweep(results, "residual", rows, swings, caption)
 
 
-def _settling(results: Results, sensors: list[str]) -> list[Figure]:
+def _settling(results: Results, sensors: list[str], asked: AskedOfRest) -> list[Figure]:
     """How long sensors take to settle, of those that have a band and do not all settle at once: since the beginning
     where they come to rest at different times."""
     known = results.study.sensor
@@ -98,9 +98,9 @@ def _settling(results: Results, sensors: list[str]) -> list[Figure]:
     rows, bands = list[Row](), list[str]()
     for sensor in told:
         name = names_of_times(sensor)[with_move]
-        base = None if with_move else 0.0
+        limit, base = (None, None) if with_move else (asked.settling_time, 0.0)
         errors = absolute_errors(results, name)
-        rows.append(Row(sensor, settling_of(results, name), errors, "s", label.format, base=base))
+        rows.append(Row(sensor, settling_of(results, name), errors, "s", label.format, limit, base))
         bands.append(f"{sensor.replace('_', ' ')} {quantity(float(known[sensor].settling_band or 0.0), 'm')}")
     longest, least = (quantity(float(end(rows[0].values)), "s") for end in (np.nanmax, np.nanmin))
     caption = (
