@@ -146,15 +146,17 @@ def show_details(outcome: Outcome) -> None:
     results = Results.of(outcome.results)
     heading(outcome.results.attrs["title"])
     paragraphs(*found_of(results))
+    shown = summary.shown(results)
     rows = [
         (_name(found), found.said(end), "" if found.is_constant else end.where)
-        for found in summary.shown(results)
+        for found in shown
         for end in ((found.largest,) if found.is_constant else (found.smallest, found.largest))
     ]
     if not summary.is_measured(outcome.results):
         blank()
         table("Smallest and largest of results", ("result", "value", "where"), rows)
-        _percentiles(results, [_name(one) for one in summary.shown(results)])
+        _percentiles_over_all(shown, results.percentiles)
+        _percentiles(results, [_name(one) for one in shown])
     _show_accuracy(outcome, results, *told_choices(results), *told_audit(outcome.audit, results))
 
 
@@ -198,6 +200,15 @@ def _where(found: Range) -> str:
     if found.value(found.smallest.value) == found.value(found.largest.value):
         return ""
     return f"{'largest' if found.telling is found.largest else 'smallest'} at {found.telling.where.replace('_', ' ')}"
+
+
+def _percentiles_over_all(found: Sequence[Range], percentiles: Sequence[float]) -> None:
+    """Of results over all variants, where the study asks for some."""
+    told = [one for one in found if one.percentiles and not one.is_constant]
+    if told:
+        parts = [f"{number(part)} %" for part in percentiles]
+        rows = [(_name(one), *map(one.value, one.percentiles)) for one in told]
+        table("Percentiles over all variants", ("result", *parts), rows)
 
 
 def _percentiles(results: Results, shown: Sequence[str]) -> None:
