@@ -30,7 +30,7 @@ from engine.accuracy.results import Result, results_of
 from engine.kernels.nearest_pilots import cheapest, nearest
 from engine.march.outcome import Asked
 from engine.scene.sweep import Cases
-from engine.scene.variants import VariantValues, axes_of_scene, cases_tolerance
+from engine.scene.variants import TOLERANCE, VariantValues, axes_of_scene, cases_tolerance
 from results_schema.arrays import Array, Counts
 
 SEED = 20261122  # of the pilots; audits have another
@@ -251,14 +251,22 @@ def scenes_of_pilots(scenes: int, size: int, count: int) -> int:
 def pilots_of(cases: Cases, members: Sequence[Counts], most: int = PILOTS) -> Counts:
     """Flat numbers of pilots, as many as are worth it and at most so many, drawn at random: of a few scenes where there
     are many. Scenes of few variants are drawn far from each other, so that few others lie beyond them all."""
-    count = min(most, usual_pilots(cases.size))
-    random, scenes = np.random.default_rng(SEED), scenes_of_pilots(len(members), cases.size, count)
-    if LEAST_IN_SCENE * len(members) <= cases.size:
+    if TOLERANCE in cases.paths:
+        members = [_distinct(cases, own) for own in members]
+    size = sum(own.size for own in members)
+    count = min(most, usual_pilots(size))
+    random, scenes = np.random.default_rng(SEED), scenes_of_pilots(len(members), size, count)
+    if LEAST_IN_SCENE * len(members) <= size:
         chosen = random.permutation(len(members))[:scenes]
     else:
         chosen = far_apart(coordinates(cases, np.array([own[0] for own in members])), scenes)
     pool = np.concatenate([members[number] for number in np.sort(chosen)])
     return np.sort(random.permutation(pool)[:count])
+
+
+def _distinct(cases: Cases, variants: Counts) -> Counts:
+    """One of those variants that differ in the tolerance alone, which are one pilot."""
+    return variants[np.unique(coordinates(cases, variants), axis=0, return_index=True)[1]]
 
 
 def far_apart(places: Array, count: int) -> Counts:

@@ -44,7 +44,8 @@ class SceneGrid:
     """A scene of the study with all its variants' numbers (``values``).
 
     unit: steps of the grid per unit of scene time; as many as the study fixes, where it fixes them. places: of each
-    envelope that marches watch, at most.
+    envelope that marches watch, at most. common: the columns of the ladder that all scenes of a sweep have, where
+    pilots of some choose for others.
     """
 
     asked: Asked
@@ -52,6 +53,7 @@ class SceneGrid:
     values: VariantValues
     unit: int
     places: int = MOST_PLACES
+    common: tuple[Numerics, ...] | None = None
     _models: dict[Numerics, SceneModel] = field(default_factory=dict)
     _readings: dict[tuple[str, int, int, int], Statics] = field(default_factory=dict)
 

@@ -5,7 +5,7 @@ A column of the ladder is a model, a number of modes and a scheme; its rungs are
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -48,20 +48,30 @@ class Ladder:
 
 def ladder_of(asked: Asked, grid: SceneGrid) -> Ladder:
     """The ladder within what the study fixes."""
-    study, own = asked.study, grid.scene.numerics
+    study, says = asked.study, grid.scene.numerics
     names = open_bodies(study)
     rigid = max((part.modal.rigid_modes for part in grid.scene.bodies if part.name in names), default=0)
     modes = [count for count in MODES if count > rigid] if names else [0]
-    schemes = [own.scheme]
+    schemes = [says.scheme]
     if study.solver.scheme == "auto" and not grid.fixed:
         schemes = [AVERAGE_ACCELERATION, FOX_GOODWIN] if swift_scheme_fits(grid) else [AVERAGE_ACCELERATION]
     columns = [
-        own._replace(fidelity=name, scheme=scheme, modes=count)
+        says._replace(fidelity=name, scheme=scheme, modes=count)
         for name in _models(asked, grid)
-        for count in (modes[:1] if name == "static" and own.static_correction else modes)
+        for count in (modes[:1] if name == "static" and says.static_correction else modes)
         for scheme in (schemes[:1] if name == "static" else schemes)
     ]
-    return Ladder(tuple(columns), (1,) if grid.fixed else CUTS)
+    own = columns if grid.common is None else [column for column in columns if column in grid.common]
+    return Ladder(tuple(own), (1,) if grid.fixed else CUTS)
+
+
+def share_ladder(asked: Asked, grids: Sequence[SceneGrid]) -> None:
+    """Let the scenes of a sweep have one ladder, of the columns that all of them have: what pilots of some scenes find
+    is told to the others."""
+    of_each = [ladder_of(asked, grid).columns for grid in grids]
+    known = set.intersection(*map(set, of_each))
+    for grid in grids:
+        grid.common = tuple(column for column in of_each[0] if column in known)
 
 
 def _models(asked: Asked, grid: SceneGrid) -> list[str]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from engine.observation.histories import CYCLE_STATIONS, WHOLE_STATIONS, counts_at_rest, counts_shown
 from results_schema.arrays import Array, Counts
+from results_schema.status import Fidelity
 
 if TYPE_CHECKING:
     from engine.accuracy.grids import SceneGrid
@@ -50,8 +51,9 @@ class Shown:
 
     def stations(self, grid: SceneGrid, tables: SceneTables, by: int, lanes: Counts) -> Counts:
         """Stations, by their count, of which a march of some variants with ``by`` steps in one of the grid's is to keep
-        histories: none where it has too few, or none of the variants."""
-        wanted = np.isin(lanes, self.lanes).any() and fine_enough(grid, tables.model, by) == by
+        histories: none where it has too few, or none of the variants, or where statics tell them, at the grid's own."""
+        marched = tables.model.fidelity is not Fidelity.STATIC and fine_enough(grid, tables.model, by) == by
+        wanted = marched and np.isin(lanes, self.lanes).any()
         return stations_shown(grid.asked, tables) if wanted else np.zeros(0, dtype=np.int64)
 
     def keep(self, lanes: Counts, found: Histories) -> None:

@@ -17,6 +17,7 @@ from engine.accuracy.choice import PILOTS, Choice, Kept, Pilots, choose, find, p
 from engine.accuracy.grids import KEPT_CYCLE, SceneGrid, unit_steps
 from engine.accuracy.groups import ConvergingGroup, Group, on_rungs
 from engine.accuracy.jobs import Share
+from engine.accuracy.ladder import share_ladder
 from engine.accuracy.reference import USUAL_LEVEL, in_full, level_work
 from engine.accuracy.results import results_of
 from engine.kernels.layout import LANES
@@ -33,7 +34,7 @@ from engine.observation.cycle_reduction import Reduction
 from engine.observation.histories import CYCLE_STATIONS, REST_STATIONS, WHOLE_STATIONS, counts_shown
 from engine.scene.study import Study
 from engine.scene.sweep import Cases, expand
-from engine.scene.variants import VariantValues, cases_tolerance
+from engine.scene.variants import VariantValues, cases_tolerance, sweeps_numerics
 from results_schema.arrays import Array, Counts, split
 from results_schema.blocks import IN_MEMORY
 from results_schema.errors import BadInput, WorkersGaveUp
@@ -106,7 +107,8 @@ class Plan:
     @property
     def converges(self) -> bool:
         """Whether every variant is marched until its results stay: where there are few."""
-        return self.size <= max(FEW, FEW_IN_SCENE * len(self.grids)) and len(self.grids) <= FEW_SCENES
+        few = len(self.grids) <= FEW_SCENES or sweeps_numerics(self.cases)  # by which neighbours would differ
+        return few and self.size <= max(FEW, FEW_IN_SCENE * len(self.grids))
 
     @property
     def groups(self) -> tuple[Group, ...]:
@@ -269,6 +271,8 @@ def make_plan(
             members.append(own)
     check_places(study, (grid.scene for grid in grids))
     plan = Plan(study, cases, asked, tuple(grids), tuple(members), shown(study, cases.size), base, results)
+    if len(grids) > 1 and not plan.converges:
+        share_ladder(asked, grids)
     check_memory(study, plan.size, plan.gathered_bytes)
     return plan
 

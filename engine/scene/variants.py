@@ -29,6 +29,8 @@ LANE_KEYS = re.compile(
     r"|carriage\.\w+\.contacts\.\w+\.damping"
     r"|carriage\.\w+\.motion\.(speed|frequency)"
 )
+#: Keys of numbers of modes, elements and steps.
+NUMERICS_KEYS = re.compile(r"solver\..+|body\..+\.(modes|elements|fixed_interface_modes)")
 _DIGITS = 2.0**40  # timing is rounded to this part of itself, so that equal ratios group whatever their rounding
 
 
@@ -60,6 +62,11 @@ def structural(study: Study, cases: Cases) -> list[str]:
     motions = {f"carriage.{name}.motion.": carriage.motion for name, carriage in study.carriage.items()}
     fixed = {f"{here}{key}" for here, motion in motions.items() for key in ("speed", "frequency") if key != motion.pace}
     return [path for path in cases.paths if path in fixed or not LANE_KEYS.fullmatch(path)]
+
+
+def sweeps_numerics(cases: Cases) -> bool:
+    """Whether a sweep sets what variants are computed with, but for their tolerances."""
+    return any(NUMERICS_KEYS.fullmatch(path) and path != TOLERANCE for path in cases.paths)
 
 
 def axes_of_scene(cases: Cases) -> list[Axis]:

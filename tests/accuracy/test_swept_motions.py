@@ -1,14 +1,21 @@
 """Sweeps of a motion's limits, each value of which makes a scene of its own."""
 
-import numpy as np
+from typing import Any
 
-from engine.accuracy.choice import MOST_SCENES, pilots_of
+import numpy as np
+import pytest
+
+import engine
+from engine.accuracy.choice import MOST_SCENES, coordinates, pilots_of
+from engine.accuracy.grids import swift_scheme_fits
+from engine.accuracy.ladder import ladder_of
 from engine.accuracy.results import results_of
 from engine.batch.audit import audit
 from engine.batch.plan import FEW_SCENES, make_plan
 from engine.scene.study import Study
 from tests.accuracy.chosen import chosen_plan
-from tests.engine.build import Table, beam, fixed, mass, study, under
+from tests.accuracy.passages import SPEED, axis, passages
+from tests.engine.build import Table, beam, cruise, fixed, mass, oscillator, study, under
 
 TOLERANCE, JUDGED = 1e-2, 12
 CAR = "carriage.car"
@@ -53,3 +60,47 @@ def test_scenes_of_a_few_variants_have_more_of_the_pilots() -> None:
     drawn = pilots_of(plan.cases, plan.members)
     of = [int(np.isin(members, drawn).sum()) for members in plan.members]
     assert drawn.size == 2 * MOST_SCENES and sorted(set(of)) == [0, 2]
+
+
+def test_variants_that_differ_in_their_tolerance_are_one_pilot() -> None:
+    wanted = {"wanted": {"of": "solver.tolerance", "values": [1e-3, 3e-3, 1e-2, 3e-2, 5e-2, 6e-2, 7e-2, 8e-2]}}
+    plan = make_plan(swept(FEW_SCENES + 2, **wanted))
+    drawn = pilots_of(plan.cases, plan.members)
+    own = coordinates(plan.cases, drawn)[:, 0]
+    assert drawn.size == np.unique(own).size == MOST_SCENES and own.min() == 0.0 and own.max() == 1.0
+    of_one_scene = make_plan(passages(20, 5, sweep={"speed": axis(SPEED, 0.3, 1.2, 100)} | wanted))
+    drawn = pilots_of(of_one_scene.cases, of_one_scene.members)
+    assert drawn.size == np.unique(coordinates(of_one_scene.cases, drawn), axis=0).shape[0] == 100
+
+
+def test_scenes_of_which_some_may_not_be_marched_swiftly_share_a_ladder() -> None:
+    """The mass on its spring swings freely after the bed: softly beside the modes of a stiff bed alone."""
+    sprung = oscillator(0.3, 30.0, cruise(0.0, 1.0, 1.0, after=2.0), wheel_mass=0.05)
+    beds = {"bed": {"of": "body.bed.second_moment", "from": 1e-3, "to": 1.0, "spacing": "log", "count": FEW_SCENES + 2}}
+    plan = chosen_plan(study(beam(modes="auto"), sprung, solver={"tolerance": TOLERANCE}, sweep=beds))
+    fits = [swift_scheme_fits(grid) for grid in plan.grids]
+    assert 10 < sum(fits) < len(fits) - 10
+    (ladder,) = {ladder_of(plan.asked, grid).columns for grid in plan.grids}
+    assert {column.scheme.name for column in ladder} == {"average-acceleration"}
+    judged = np.setdiff1d(np.arange(plan.size), plan.choice.pilots if plan.choice else [])[::20]
+    held = np.isfinite([result.tolerance for result in results_of(plan.asked)])
+    assert audit(plan, judged).observed[held].max() < TOLERANCE
+
+
+def test_swept_numbers_of_modes_converge_by_themselves() -> None:
+    """Pilots with some modes tell nothing of variants with others."""
+    modes = {"modes": {"of": "body.bed.modes", "values": list(range(2, 12))}}
+    lengths = {"length": axis("body.bed.length", 1.0, 2.0, 13)}
+    plan = make_plan(passages(bed=beam(modes=3), sweep=modes | lengths))
+    assert len(plan.grids) == 130 > FEW_SCENES and plan.converges
+
+
+@pytest.mark.parametrize("histories", ["all", {"every": 7}])
+def test_histories_of_statics_are_at_the_stations_of_their_grid(histories: Any) -> None:
+    """However many steps their levels have."""
+    given = passages(2, 2, solver={"fidelity": "static"}, output={"histories": histories})
+    found = engine.run(given)
+    plan = make_plan(given)
+    steps = plan.grids[0].tables(plan.grids[0].scene, 1).timeline.steps
+    every = 1 if histories == "all" else 7
+    assert found.sizes["station"] == len(range(0, steps + 1, every)) < 100
