@@ -74,8 +74,9 @@ declare(
         estimated_error | result | | optional float32 nan | estimated error of every reported number
             over the largest static value of the sensor (velocity and acceleration, and where it reads nothing at rest:
             over its own largest value; contact forces: over the weight; positions and lags: over the length of the
-            track and of the cruise; indices: as they are; frequencies: over themselves; other results at rest: over
-            the largest along the way); of places no less than a step; NaN where no estimate exists
+            track and of the cruise; indices: as they are; frequencies, settling times and times of move and settling:
+            over themselves; other results at rest: over the largest along the way); of places no less than a step; NaN
+            where no estimate exists
         tolerance | result | | optional alone nan | tolerance of every reported number
             that of its sensor, else solver.tolerance; NaN where the error is reported, but not held
         """,
