@@ -84,9 +84,9 @@ def _told_of_times(outcome: Outcome, asked: Asked, error: Mapping[str, Array]) -
             continue
         swings = outcome.numbers[f"{name}_residual"] + error[f"{name}_residual"] * outcome.scale[:, j]
         for own in names_of_times(name):
-            unknown = np.isnan(outcome.numbers[own]) | (error[own] > MOST_OF_TIMES)
-            error[own][unknown] = np.nan
             error[own][swings < sensor.settling_band] = 0.0
+            unknown = np.isnan(outcome.numbers[own]) | (error[own] > MOST_OF_TIMES)
+            error[own][unknown] = np.nan  # also where it stays within, of a rest too short to tell
 
 
 def _worst(error: Array, results: tuple[Result, ...]) -> Array:
