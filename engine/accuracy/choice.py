@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from engine.accuracy.climb import Climb, Measured
 from engine.accuracy.grids import SceneGrid
-from engine.accuracy.jobs import Crashed, Halted, Job, Share, over_scenes
+from engine.accuracy.jobs import Crashed, Halted, Job, Share, Told, over_scenes
 from engine.accuracy.ladder import Ladder, ladder_of
 from engine.accuracy.neighbour_errors import (
     TELLING,
@@ -170,11 +170,11 @@ class Kept(Protocol):
         """Keep it."""
 
 
-def find(pilots: Pilots, members: Sequence[Counts], drawn: Counts, share: Share) -> Found:
-    """What some ``drawn`` pilots of a sweep, whose scenes' variants are ``members``, find. Raises Halted, and Crashed
-    by flat numbers of pilots."""
+def find(pilots: Pilots, members: Sequence[Counts], drawn: Counts, share: Share, told: Told | None = None) -> Found:
+    """What some ``drawn`` pilots of a sweep, whose scenes' variants are ``members``, find; told: of how many scenes are
+    done. Raises Halted, and Crashed by flat numbers of pilots."""
     parts = [drawn[np.isin(drawn, part)] for part in members]
-    found = sorted(over_scenes(share, pilots, Pilots.measured, parts), key=lambda one: (one[0], one[1][0]))
+    found = sorted(over_scenes(share, pilots, Pilots.measured, parts, told), key=lambda one: (one[0], one[1][0]))
     order = np.concatenate([own for _, own, _ in found])
     return Found(found[0][0], order, _joined([measured for *_, measured in found]))
 

@@ -11,6 +11,7 @@ from results_schema.arrays import Counts
 
 T = TypeVar("T")
 Halted = Callable[[], bool]
+Told = Callable[[int, int], object]  # how many are done, and of how many
 
 
 @dataclass(frozen=True)
@@ -39,9 +40,11 @@ class Crashed(Exception):
         self.lanes = lanes
 
 
-def over_scenes(share: Share, subject: Any, function: Callable[..., T], parts: Sequence[Counts]) -> list[T]:
+def over_scenes(
+    share: Share, subject: Any, function: Callable[..., T], parts: Sequence[Counts], told: Told | None = None
+) -> list[T]:
     """What a function of the subject, some variants, what shares their jobs out and their scene finds of every scene's
-    part of the variants, in any order.
+    part of the variants, in any order. told: of how many of several scenes are done.
 
     The marches of a single scene are shared out, several scenes are as wholes, as jobs that wait for jobs would hold
     threads."""
@@ -49,7 +52,12 @@ def over_scenes(share: Share, subject: Any, function: Callable[..., T], parts: S
     if len(scenes) == 1:
         return [function(subject, part, share, scene) for scene, part in scenes]
     jobs = [Job(partial(_whole_scene, function=function, scene=scene), part) for scene, part in scenes]
-    return list(share(subject, jobs))
+    found = list[T]()
+    for one in share(subject, jobs):
+        found.append(one)
+        if told is not None:
+            told(len(found), len(jobs))
+    return found
 
 
 def _whole_scene(subject: Any, lanes: Counts, halted: Halted, function: Callable[..., T], scene: int) -> T:

@@ -17,7 +17,8 @@ from engine.accuracy.shown import stations_shown
 from engine.batch.plan import NOBODY, Plan
 from engine.linear_algebra import one_thread
 from engine.march.outcome import USED, Asked, Flat, Outcome, histories
-from engine.march.rest import names_of_times
+from engine.march.rest import WIDER, names_of_times
+from engine.observation.cycle_reduction import HISTORY_PART
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts
 from results_schema.errors import WorkersGaveUp
@@ -77,16 +78,31 @@ def told_errors(found: Found, asked: Asked) -> Array:
 
 
 def _told_of_times(outcome: Outcome, asked: Asked, error: Mapping[str, Array]) -> None:
-    """Errors (V,) by result, changed in place: none of a sensor that surely stays within its band from the stop on; no
-    estimate where it does not settle, or where neighbours do a swing apart, so that nothing is told."""
+    """Errors (V,) by result, changed in place: by how much a settling time changes where its band is wider or narrower
+    by what the readings may be off; none where a sensor surely stays within its band from the stop on; no estimate
+    where it does not settle, or may not, or by as much as it takes."""
     for j, (name, sensor) in enumerate(asked.study.sensor.items()):
         if sensor.settling_band is None:
             continue
-        swings = outcome.numbers[f"{name}_residual"] + error[f"{name}_residual"] * outcome.scale[:, j]
-        for own in names_of_times(name):
-            error[own][swings < sensor.settling_band] = 0.0
-            unknown = np.isnan(outcome.numbers[own]) | (error[own] > MOST_OF_TIMES)
-            error[own][unknown] = np.nan  # also where it stays within, of a rest too short to tell
+        residual, off = outcome.numbers[f"{name}_residual"], error[f"{name}_residual"] * outcome.scale[:, j]
+        settling_time, _ = own = names_of_times(name)
+        change = _within_bands(outcome, name, off / HISTORY_PART / sensor.settling_band, outcome.numbers[settling_time])
+        for result in own:
+            took = outcome.numbers[result]
+            part = np.divide(change, took, out=np.where(change > 0.0, np.inf, 0.0), where=took > 0.0)
+            part[residual + off < sensor.settling_band] = 0.0
+            unknown = np.isnan(took) | ~(part <= MOST_OF_TIMES)
+            error[result][:] = np.where(
+                unknown, np.nan, part
+            )  # also where it stays within, of a rest too short to tell
+
+
+def _within_bands(outcome: Outcome, sensor: str, parts: Array, took: Array) -> Array:
+    """(V,) by how much a settling time changes at most where its band is wider or narrower by parts of it (V,); NaN
+    where that is more than is known, or it has not settled in the narrower one."""
+    times = np.concatenate([outcome.other_bands[sensor], np.full((took.size, 2, 1), np.nan)], axis=2)
+    place = np.searchsorted(WIDER, np.where(np.isnan(parts), np.inf, parts))
+    return np.asarray(np.abs(times[np.arange(took.size), :, place] - took[:, None]).max(axis=1))
 
 
 def _worst(error: Array, results: tuple[Result, ...]) -> Array:

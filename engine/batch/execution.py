@@ -112,14 +112,16 @@ def warm_up(plan: Plan) -> None:
         _first_steps(grid)
 
 
-def choose(plan: Plan, here: Place, stop: threading.Event | None, kept: Kept | None = None) -> None:
+def choose(
+    plan: Plan, here: Place, stop: threading.Event | None, kept: Kept | None = None, told: Progress | None = None
+) -> None:
     """What the variants are computed with, measured by pilots, unless what these found is ``kept``; those that end
-    every process are left out. Raises Interrupted when ``stop`` is set."""
+    every process are left out. told: of how many scenes of pilots are done. Raises Interrupted when ``stop`` is set."""
     without = NOBODY
     with _interrupted():
         while True:
             try:
-                return plan.choose(Shared(here, _asked(stop)), without=without, kept=kept)
+                return plan.choose(Shared(here, _asked(stop)), without=without, kept=kept, told=told)
             except Crashed as crashed:
                 without = np.union1d(without, crashed.lanes)
 

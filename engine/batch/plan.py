@@ -16,7 +16,7 @@ import numpy as np
 from engine.accuracy.choice import PILOTS, Choice, Kept, Pilots, choose, find, pilots_of, tolerance_span
 from engine.accuracy.grids import KEPT_CYCLE, SceneGrid, unit_steps
 from engine.accuracy.groups import ConvergingGroup, Group, on_rungs
-from engine.accuracy.jobs import Share
+from engine.accuracy.jobs import Share, Told
 from engine.accuracy.ladder import share_ladder
 from engine.accuracy.reference import USUAL_LEVEL, in_full, level_work
 from engine.accuracy.results import results_of
@@ -123,10 +123,17 @@ class Plan:
         """(V,) `solver.tolerance` of every variant over the study's."""
         return cases_tolerance(self.study, self.cases)
 
-    def choose(self, share: Share, pilots: int = PILOTS, without: Counts = NOBODY, kept: Kept | None = None) -> None:
+    def choose(
+        self,
+        share: Share,
+        pilots: int = PILOTS,
+        without: Counts = NOBODY,
+        kept: Kept | None = None,
+        told: Told | None = None,
+    ) -> None:
         """Measure pilots, at most so many and ``without`` some variants, and choose, where the study has many variants.
-        ``kept``: where what pilots found is kept, if anywhere. Raises Halted, Crashed by flat numbers of pilots, and
-        WorkersGaveUp where all of them crashed."""
+        ``kept``: where what pilots found is kept, if anywhere; told: of how many of their scenes are done. Raises
+        Halted, Crashed by flat numbers of pilots, and WorkersGaveUp where all of them crashed."""
         if not self.converges and self.choice is None:
             of = Pilots(self.asked, self.cases, self.grids, tolerance_span(self.asked, self.cases))
             drawn = np.setdiff1d(pilots_of(self.cases, self.members, pilots), without)
@@ -135,7 +142,7 @@ class Plan:
                 raise WorkersGaveUp(what, remedy="try the study without workers")
             found = kept.read(drawn) if kept else None
             if found is None:
-                found = find(of, self.members, drawn, share)
+                found = find(of, self.members, drawn, share, told)
                 if kept:
                     kept.write(found)
             self.choice = choose(of, found, share)

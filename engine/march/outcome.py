@@ -14,7 +14,7 @@ from engine.kernels import layout
 from engine.kernels.schemes import Scheme
 from engine.march.envelopes import MOST_KEPT, envelope_names
 from engine.march.march import Marched
-from engine.march.rest import counts_settling, elapsed, residuals, settling_times
+from engine.march.rest import counts_settling, elapsed, residuals, settling_in_other_bands, settling_times
 from engine.march.richardson import march_scheme
 from engine.march.tables import SceneTables
 from engine.model.lane_table import in_whole_blocks, weight, weights
@@ -67,28 +67,30 @@ class Asked:
 class Outcome:
     """What V variants report by one march: numbers (V, ...) by name, histories (H, S, V) of all signals at the stations
     that were asked for, statuses and the first diverged steps (V,), and (V, J) what errors of the sensors are divided
-    by, infinite for those that read but rounding. shown: histories (V, H) as archives keep them, by name; none where
-    they were not asked for."""
+    by, infinite for those that read but rounding. other_bands: by sensor (V, 2, ...) the settling times by which the
+    errors of its own are told. shown: histories (V, H) as archives keep them, by name; none where they were not asked
+    for."""
 
     numbers: Flat
     history: Array
     status: NDArray[np.int8]
     diverged_step: Counts
     scale: Array
+    other_bands: dict[str, Array] = field(default_factory=dict)
     shown: dict[str, Array] = field(default_factory=dict)
 
     def of(self, lanes: Counts | NDArray[np.bool_]) -> Outcome:
         """Some of the variants."""
         numbers = {name: array[lanes] for name, array in self.numbers.items()}
-        return Outcome(
-            numbers, self.history[..., lanes], self.status[lanes], self.diverged_step[lanes], self.scale[lanes]
-        )
+        rest = self.history[..., lanes], self.status[lanes], self.diverged_step[lanes], self.scale[lanes]
+        return Outcome(numbers, *rest, {name: array[lanes] for name, array in self.other_bands.items()})
 
     def replaced(self, lanes: Counts, other: Outcome) -> Outcome:
         """The same with the outcome of other marches for some of the variants, at the same stations."""
         found = deepcopy(self)
-        for name, array in found.numbers.items():
-            array[lanes] = other.numbers[name]
+        for own, given in ((found.numbers, other.numbers), (found.other_bands, other.other_bands)):
+            for name, array in own.items():
+                array[lanes] = given[name]
         found.history[..., lanes] = other.history
         found.status[lanes], found.diverged_step[lanes] = other.status, other.diverged_step
         found.scale[lanes] = other.scale
@@ -128,7 +130,8 @@ def outcome(
         if array.dtype == np.float64:
             array[nothing] = np.nan
     kept = _described(tables, values, shown, marched, counts) if shown.size else {}
-    return Outcome(numbers, history, status, diverged_step, _scale(tables, values, numbers), kept)
+    other_bands = settling_in_other_bands(tables, values, counts, marched.history)
+    return Outcome(numbers, history, status, diverged_step, _scale(tables, values, numbers), other_bands, kept)
 
 
 USED = ("fidelity_used", "scheme_used", "modes_used", "steps_used")  # what a variant is marched again by

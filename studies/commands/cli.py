@@ -277,13 +277,14 @@ def _run(study: str, archive: Path | None, options: RunOptions) -> Outcome:
     with stopping.stop_on_signals() as stop:
         import engine
         from studies.commands import catalogue, console, screens
+        from studies.protocol.listener import Listener
         from studies.runs.runner import run_to_archive
 
         path = catalogue.find_study(study)
         loaded = engine.load(path)
         with console.progress_bar(path.stem) as bar:
-            place, warn = archive or Path(f"{path.stem}.nc"), screens.warn_of
-            return run_to_archive(loaded, place, options, progress=bar.show, stage=bar.say, remark=warn, stop=stop)
+            listener = Listener(bar.show, bar.say, bar.note, screens.warn_of)
+            return run_to_archive(loaded, archive or Path(f"{path.stem}.nc"), options, listener=listener, stop=stop)
 
 
 def _refuse_what_is_no_archive(archive: Path) -> None:

@@ -183,10 +183,12 @@ def blank() -> None:
 
 
 class Bar(NamedTuple):
-    """What moves a progress bar: call `show` with what is done and the total, `say` with what is being done."""
+    """What moves a progress bar: `show` has what is done and the total, `say` what is being done, `note` how far that
+    is where nothing is counted yet."""
 
     show: Callable[[int, int], None]
     say: Callable[[str], None]
+    note: Callable[[str], None]
 
 
 @contextmanager
@@ -205,13 +207,16 @@ def progress_bar(label: str, seconds: float = SECONDS_PER_LINE) -> Iterator[Bar]
         def show(finished: int, total: int) -> None:
             bar.update(task, completed=finished, total=total)
 
-        yield Bar(show, partial(say_stage, label, console=bar.console))
+        def note(words: str) -> None:
+            bar.update(task, description=f"{label}: {words}" if words else label)
+
+        yield Bar(show, partial(say_stage, label, console=bar.console), note)
 
 
 @contextmanager
 def _progress_lines(label: str, seconds: float) -> Iterator[Bar]:
     """Lines by a thread of their own, as long as the block lasts."""
-    now: dict[str, Any] = {"words": "", "resumed": None, "finished": 0, "total": 0}
+    now: dict[str, Any] = {"words": "", "resumed": None, "finished": 0, "total": 0, "note": ""}
     ended, started = threading.Event(), time.monotonic()
 
     def tell() -> None:
@@ -223,26 +228,35 @@ def _progress_lines(label: str, seconds: float) -> Iterator[Bar]:
         now.update(resumed=resumed, finished=finished, total=total)
 
     def say(words: str) -> None:
-        now.update(words=words)
         if words == COMPILING:  # what else comes before the first line would be silence
             say_compiling(label, words)
+        else:
+            now.update(words=words)
+
+    def note(words: str) -> None:
+        now.update(note=words)
 
     teller = threading.Thread(target=tell, daemon=True)
     teller.start()
     try:
-        yield Bar(show, say)
+        yield Bar(show, say, note)
     finally:
         ended.set()
         teller.join()
 
 
-def progress_line(label: str, seconds: float, *, words: str, resumed: int | None, finished: int, total: int) -> str:
+def progress_line(
+    label: str, seconds: float, *, words: str, resumed: int | None, finished: int, total: int, note: str = ""
+) -> str:
     """How far a run is after some seconds; resumed: of what is finished, what was so before.
 
     >>> progress_line("bridge", 62.0, words="marching", resumed=40, finished=80, total=400)
     'bridge: marching; 80 of 400 after 62 s, about 8.3 min left'
+    >>> progress_line("bridge", 62.0, words="choosing", resumed=0, finished=0, total=400, note="2 of 9 scenes")
+    'bridge: choosing, 2 of 9 scenes; 0 of 400 after 62 s'
     """
-    doing = f"{label}: {words}; " if words else f"{label}: "
+    told = ", ".join(filter(None, (words, note)))
+    doing = f"{label}: {told}; " if told else f"{label}: "
     done = finished - (resumed or 0)
     left = f", about {duration(seconds * (total - finished) / done)} left" if done and finished < total else ""
     return f"{doing}{finished:,} of {total:,} after {duration(seconds)}{left}"

@@ -199,7 +199,7 @@ def _where(found: Range) -> str:
     """Where the end of a range is that tells most; "" where both are told by the same digits."""
     if found.value(found.smallest.value) == found.value(found.largest.value):
         return ""
-    return f"{'largest' if found.telling is found.largest else 'smallest'} at {found.telling.where.replace('_', ' ')}"
+    return f"{'largest' if found.telling is found.largest else 'smallest'} {found.telling.at.replace('_', ' ')}"
 
 
 def _percentiles_over_all(found: Sequence[Range], percentiles: Sequence[float]) -> None:

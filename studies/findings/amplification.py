@@ -48,6 +48,17 @@ def largest(results: Results, values: Array) -> Index | None:
     return extreme(np.where(held, values, np.nan))
 
 
+def told_amplification(results: Results, sensor: str) -> Array:
+    """The dynamic amplification of a sensor that sentences and figures tell, in the sweep's shape; NaN throughout where
+    statics are no measure of what it reads: across gravity, of a body that carriages push along its track or across it
+    by their inertia, which no static value counts."""
+    own, body = results.study.sensor[sensor], results.study.body_of(sensor)
+    pushed = any(one.on == body and one.pushes for one in results.study.carriage.values())
+    if pushed and own.way[:2] != (0.0, 0.0):
+        return np.full(results.shape, np.nan)
+    return results.numbers("dynamic_amplification", sensor)
+
+
 def with_amplification(dataset: xr.Dataset, study: Study) -> xr.Dataset:
     """The dataset with `dynamic_amplification`, from `<sensor>_max`, `_min` and `_static`, and its errors."""
     ratios = []

@@ -60,11 +60,12 @@ def speeds_in_step(
         own = body.isel({body["frequency"].dims[0]: mode})
         frequency = float(own["frequency"])
         share = train.in_step(speeds / frequency)
-        inside = (share[1:-1] > share[:-2]) & (share[1:-1] >= share[2:]) & (share[1:-1] >= TOLD_IN_STEP)
-        at = 1 + np.flatnonzero(inside)
-        swings = newtons * share[at] * _per_newton(train, own, speeds[at]) * _moved(own, seen)
+        swings = newtons * share * _per_newton(train, own, speeds) * _moved(own, seen)
         swings = swings if read else swings / (2.0 * np.pi * frequency) ** 2
-        numbers = zip(speeds[at].tolist(), share[at].tolist(), swings.tolist(), strict=True)
+        # Of the product: a crossing may cancel what comes in step just where all of it does.
+        inside = (swings[1:-1] > swings[:-2]) & (swings[1:-1] >= swings[2:]) & (share[1:-1] >= TOLD_IN_STEP)
+        at = 1 + np.flatnonzero(inside)
+        numbers = zip(speeds[at].tolist(), share[at].tolist(), swings[at].tolist(), strict=True)
         found += [InStep(speed, frequency, part, swing, units) for speed, part, swing in numbers]
     strongest = sorted(found, key=lambda one: one.swing)[-MOST:]
     return sorted((one for one in strongest if one.swing >= LEAST * strongest[-1].swing), reverse=True)

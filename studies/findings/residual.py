@@ -4,18 +4,19 @@ import numpy as np
 
 from engine.march.rest import names_of_times, settling
 from engine.scene.study import Study
-from results_schema.arrays import Array
+from results_schema.arrays import Array, Mask
 from studies.findings.absolute_errors import absolute_errors, told_error
 from studies.findings.amplification import only_rounding, sizes
 from studies.findings.beyond import LIMITED, AskedOfRest, Limits, in_turns, out_of_reach, where_beyond
 from studies.findings.effects import by_effect
 from studies.results.axes import VARIANT, Axis
 from studies.results.findings_common import in_words
-from studies.results.formatting import ROUNDING, counted, quantity
-from studies.results.places import Index, extreme
+from studies.results.formatting import ROUNDING, counted, listed, quantity
+from studies.results.places import Index, chosen, extreme
 from studies.results.results import Results
 
 MOST_SENSORS = 4
+MOST_BEST = 4  # values of a swept number of which each is told its best motion
 LAST = 8  # values along a swept number that are looked at: where it is swept too coarsely most of them turn
 FEWEST = 6  # of these
 LEAST_STEP = 0.1  # of the largest value: smaller ones do not count as up or down
@@ -149,18 +150,43 @@ def _settled(results: Results, sensor: str, asked: AskedOfRest, axis: Axis | Non
     if moves_differ(results, sensor):
         said.append(_shortest(results, sensor))
     if left:
-        have = "have" if left > 1 else "has"
-        said.append(f"{counted(left, 'variant')} {have} not settled by the end of the run: a longer rest tells when")
+        said.append(_not_settled(results, results.with_values & np.isnan(values), axis))
     return "".join(f"; {one}" for one in said)
 
 
+def _not_settled(results: Results, left: Mask, axis: Axis | None) -> str:
+    """How many variants have not settled by the end of their runs, and which these are."""
+    have = f"{counted(int(left.sum()), 'variant')} {'have' if left.sum() > 1 else 'has'}"
+    along = axis is not None and axis.dim != VARIANT
+    where = f", {where_beyond(results, left.astype(float), 0.5, axis)} of {axis.noun}" if axis and along else ""
+    return f"{have} not settled by the end of the run{where}: a longer rest tells when"
+
+
 def _shortest(results: Results, sensor: str) -> str:
-    """The shortest time of move and settling."""
-    name = names_of_times(sensor)[1]
-    values = settling_of(results, name)
+    """The shortest time of move and settling: for every value of the one swept number that is none of the motion's."""
+    values = settling_of(results, names_of_times(sensor)[1])
+    others = [
+        axis for axis in results.axes if axis.values.size > 1 and not any(".motion." in one for one in axis.paths)
+    ]
+    if VARIANT in results.dims or len(others) != 1:
+        return f"move and settling take {_least(results, sensor, values)} at least"
+    (axis,), rows = others, list[str]()
+    own = results.everywhere(results.dataset[axis.name])
+    for value in chosen(np.sort(axis.values).tolist(), MOST_BEST):
+        if np.isfinite(among := np.where(own == value, values, np.nan)).any():
+            rows.append(f"{_least(results, sensor, among, axis)} ({axis.noun} {axis.in_words(value)})")
+    return f"move and settling take at least {listed(rows)}"
+
+
+def _least(results: Results, sensor: str, values: Array, known: Axis | None = None) -> str:
+    """The smallest of times with its error, and where in the sweep it is, of which one swept number may be known."""
     place = extreme(-values)
     assert place is not None
-    took, error = float(values[place]), float(absolute_errors(results, name)[place])
-    return (
-        f"move and settling take {quantity(took, 's')}{told_error(error, took, 's')} at least{in_words(results, place)}"
+    took, error = float(values[place]), float(absolute_errors(results, names_of_times(sensor)[1])[place])
+    axes = [axis for axis in results.axes if axis.values.size > 1 and axis is not known]
+    where = (
+        in_words(results, place)
+        if known is None
+        else f" at {', '.join(axis.at(place[results.dims.index(axis.dim)]) for axis in axes)}"
     )
+    return f"{quantity(took, 's')}{told_error(error, took, 's')}{where}"

@@ -17,6 +17,7 @@ from studies.findings.amplification import (
     largest,
     only_rounding,
     sizes,
+    told_amplification,
     with_amplification,
     with_own_weight,
 )
@@ -117,13 +118,13 @@ def _nothing(results: Results, sensor: str) -> str:
 
 def _extremes(results: Results, sensor: str) -> tuple[Index | None, Index | None]:
     """The variants with the largest value and with the largest amplification of one sensor."""
-    gain = results.numbers("dynamic_amplification", sensor)
+    gain = told_amplification(results, sensor)
     return largest(results, sizes(results, sensor)), largest(results, gain)
 
 
 def _largest(results: Results, sensor: str) -> str:
     """The largest value and the largest amplification of one sensor, and where they are, while the contact holds."""
-    gain, (top, best) = results.numbers("dynamic_amplification", sensor), _extremes(results, sensor)
+    gain, (top, best) = told_amplification(results, sensor), _extremes(results, sensor)
     if top is None:
         return f"{sensor}: no variant has values."
     value = _value(results, sensor, top)
@@ -166,7 +167,7 @@ def _effects(results: Results, envelopes: list[str], sensors: list[str]) -> str:
 
 def _amplified(results: Results, sensor: str) -> str:
     """Where statics are exceeded by as much as the question names; "" without anything to compare."""
-    gain, study = results.numbers("dynamic_amplification", sensor), results.study
+    gain, study = told_amplification(results, sensor), results.study
     known = np.isfinite(np.where(results.with_values, gain, np.nan)).any()
     says_nothing = study.sensor[sensor].is_dynamic_part or study.solver.fidelity == "static"
     if says_nothing or results.size < 2 or not known:
@@ -181,7 +182,7 @@ def _amplified(results: Results, sensor: str) -> str:
 def _amplified_besides(results: Results, told: str) -> str:
     """Which sensors besides that one exceed statics by as much as the question names, the most first."""
     wholes = [name for name in results.sensors if name != told and not results.study.sensor[name].is_dynamic_part]
-    gains = {name: results.counting("dynamic_amplification", name) for name in wholes}
+    gains = {name: np.where(results.with_values, told_amplification(results, name), np.nan) for name in wholes}
     most = {name: float(np.nanmax(gain)) for name, gain in gains.items() if np.isfinite(gain).any()}
     threshold = question_of(results.study, AskedOfPassages).amplification
     beyond = sorted((name for name, gain in most.items() if gain > threshold), key=lambda name: -most[name])

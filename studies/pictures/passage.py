@@ -17,8 +17,9 @@ from studies.findings.effects import unchanged
 from studies.pictures.common import figures as look
 from studies.pictures.common import residual
 from studies.pictures.common.figures import Figure, colour_bar, draw, legend_beside, zero_line
+from studies.pictures.common.maps import MANY, Mapped, maps
 from studies.pictures.common.response import response
-from studies.pictures.common.sizes import gain, sizes_of, speed_ratio, told_flat
+from studies.pictures.common.sizes import gain, peak, sizes_of, speed_ratio, told_flat
 from studies.pictures.common.sweep_view import (
     DAMPING,
     MOST_CURVES,
@@ -32,13 +33,12 @@ from studies.pictures.common.sweep_view import (
 )
 from studies.pictures.common.traces import picked
 from studies.protocol.study import question_of
-from studies.results.formatting import number
+from studies.results.formatting import number, quantity
 from studies.results.places import Index
 from studies.results.results import Results
 
 MOST_HISTORIES = 4
 CURVES = (".mass", *DAMPING, ".force")  # by what they tell: a force multiplies all that it does by the same factor
-MANY = 6  # values of the second axis from which on a map says more than curves
 FLAT = 0.1  # a map of ratios that vary less shows nothing
 
 
@@ -64,6 +64,8 @@ def pictures(results: Results) -> list[Figure]:
             (first if asked else others).append(_sizes(results, own, limit))
         if seen.y is not None and len(seen.y.values) > MANY and _is_telling(seen, gain(results, sensors[0])):
             first.append(_map(seen, sensors[0]))
+        else:
+            first += _map_of_sizes(results, sensors[0], limits)
         touching = [name for name in results.study.carriage if _has_contact(seen, name)]
         first += [_contact(seen, touching)] if touching else []
     size = np.where(results.with_values, sizes(results, sensors[0]), np.nan)
@@ -120,6 +122,16 @@ def _map(seen: View, sensor: str) -> Figure:
     title = f"{sensor.replace('_', ' ')}: dynamic over static is {number(float(np.nanmax(shown[counting])))} at most"
     caption = seen.caption("While the contact holds the title counts; the map goes on beyond." if opened else "")
     return draw("amplification-map", title, caption, 3.4, partial(_draw_map, seen, sensor))
+
+
+def _map_of_sizes(results: Results, sensor: str, limits: AskedOfPassages) -> list[Figure]:
+    """Of a sensor whose amplification is not known, or varies little, the largest values themselves."""
+    values = np.where(results.with_values, sizes(results, sensor), np.nan)
+    limit, label = limits.of(results.study.sensor[sensor]), partial(results.label, sensor, of="largest")
+    most = quantity(peak(results, sensor), results.sensors[sensor])
+    title = f"{sensor.replace('_', ' ')} over two swept numbers: at most {most}"
+    mapped = Mapped(values, results.sensors[sensor], label, limit)
+    return maps(results, mapped, f"largest-{results.noun(sensor)}", title, "Largest absolute values.")
 
 
 def _draw_map(seen: View, sensor: str, drawing: Drawing) -> None:

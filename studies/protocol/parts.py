@@ -23,12 +23,13 @@ from results_schema.store.tables import Table, from_dataset, to_dataset
 from results_schema.variables import declarations
 from studies.protocol.kept_pilots import NAME as PILOTS
 from studies.protocol.kept_pilots import KeptPilots
+from studies.protocol.listener import NOBODY, Listener
 from studies.protocol.stopping import AskedElsewhere, Stop
 from studies.protocol.streamed import streamed, summarised, with_coordinates
+from studies.results.formatting import counted
 from studies.results.results import Results
 
 if TYPE_CHECKING:
-    from engine.batch.execution import Progress
     from engine.batch.executors import Place
     from engine.scene.study import Study
     from studies.protocol.study import Kind, PiecedKind
@@ -39,27 +40,25 @@ USED = "_used"  # the end of the names of what a variant was computed with
 
 
 class Work:
-    """How parts are computed: where, who is told of the progress, and whether somebody asked to stop.
+    """How parts are computed: where, who listens, and whether somebody asked to stop.
 
-    threads: of this process, where no place is given. stage: told in words what is being done. chunk: variants of a
-    task where that is fixed, as of `engine.run`.
+    threads: of this process, where no place is given. chunk: variants of a task where that is fixed, as of
+    `engine.run`.
     """
 
     def __init__(
         self,
         threads: int | None = None,
         stop: Stop | None = None,
-        progress: Progress | None = None,
+        listener: Listener = NOBODY,
         chunk: int | None = None,
-        stage: Callable[[str], None] | None = None,
         place: Place | None = None,
     ) -> None:
         from engine.batch.executors import Threads, cores
 
         self.place: Place = place or Threads(threads or cores())
         self.stop = stop or Stop()
-        self.progress: Progress = progress or (lambda finished, total: None)
-        self.stage: Callable[[str], None] = stage or (lambda words: None)
+        self.listener = listener
         self.chunk = chunk
 
     @property
@@ -179,14 +178,17 @@ class Variants:
         from engine.batch.execution import choose, execute
 
         done = np.unique(np.concatenate([np.empty(0, np.int64), *store.finished().values()]))
-        work.progress(int(done.size), self.plan.size)
-        work.stage("measuring what each variant needs, then marching")
+        work.listener.progress(int(done.size), self.plan.size)
+        work.listener.stage("measuring what each variant needs, then marching")
         try:
-            choose(self.plan, work.place, work.stop.event, KeptPilots(store))  # an audit asks for it, too
+            choose(
+                self.plan, work.place, work.stop.event, KeptPilots(store), partial(_told_of_pilots, work)
+            )  # audits ask for it, too
+            work.listener.note("")
             if done.size < self.plan.size:
                 with Gatherer(partial(self._keep, store)) as parts:
                     how: dict[str, Any] = {"chunk": work.chunk, "stop": work.stop.event}
-                    execute(self.plan, parts.add, work.place, progress=work.progress, done=done, **how)
+                    execute(self.plan, parts.add, work.place, progress=work.listener.progress, done=done, **how)
         except Interrupted:
             work.check()
             raise
@@ -255,6 +257,11 @@ class Variants:
 
         dataset = summarised(self.kind, build(self.plan, found.arrays, found.selected), self.plan.study)
         return with_coordinates(self.kind, dataset, self.plan.study)
+
+
+def _told_of_pilots(work: Work, done: int, total: int) -> None:
+    """Variants are marched when all pilots are measured: until then none is finished."""
+    work.listener.note(f"pilots of {done} of {counted(total, 'scene')} measured")
 
 
 @dataclass(frozen=True, eq=False)
@@ -335,18 +342,18 @@ class Pieces:
         held = store.finished()
         left = {piece.name: piece for piece in self.pieces if piece.name not in held}
         done = len(self.names) - len(left)
-        work.progress(done, len(self.names))
+        work.listener.progress(done, len(self.names))
 
         def keep(found: tuple[str, xr.Dataset]) -> None:
             name, dataset = found
             store.write(name, {"/": from_dataset(dataset)})
             del left[name]
-            work.progress(len(self.names) - len(left), len(self.names))
+            work.listener.progress(len(self.names) - len(left), len(self.names))
             tell()
 
         def tell() -> None:
             if left:
-                work.stage(next(iter(left.values())).words)
+                work.listener.stage(next(iter(left.values())).words)
 
         tell()
         nobody = np.zeros(1, dtype=np.int64)

@@ -18,6 +18,7 @@ from results_schema.lazy_imports import xr
 from results_schema.registry import ABSENT, Pieces, lacks, no_row_of
 from results_schema.validate import validate
 from studies.protocol.checksum import VALUES, checksum_of_values
+from studies.protocol.listener import NOBODY, Listener
 from studies.protocol.parts import Foreseen, Memory, TextTable, Variants, Work
 
 if TYPE_CHECKING:
@@ -288,7 +289,9 @@ def run(study: Study | str | Path, **options: Any) -> xr.Dataset:
         warnings.warn(remark, Remark, stacklevel=2)
     where = {key: options.pop(key) for key in Where.__annotations__ if key in options}
     with place(**where) as here:
-        parts.compute(store, Work(place=here, **options))
+        progress = options.get("progress")
+        listener = NOBODY if progress is None else Listener(progress)
+        parts.compute(store, Work(place=here, listener=listener, chunk=options.get("chunk")))
     found = compared(parts.gather(store), study)
     seconds = round(time.perf_counter() - started, 3)
     return found.assign_attrs({"run_seconds": seconds, VALUES: checksum_of_values(found)})

@@ -14,7 +14,7 @@ from results_schema.lazy_imports import xr
 from results_schema.status import Status, label
 from studies.at_rest.errors import errors_along
 from studies.findings.absolute_errors import absolute_errors, told_error
-from studies.findings.amplification import sizes
+from studies.findings.amplification import DYNAMIC_AMPLIFICATION, sizes, told_amplification
 from studies.findings.numerics_used import ERROR, WORK, is_marched
 from studies.findings.residual import has_whole
 from studies.protocol.study import kind_named
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 SOME_NOT_OK = 3
 ENERGY = "energy_change"  # of frames that move
+MOST_TIED = 3  # variants with the same value of which the first is named
 LEAST_TOLD = 1e-5  # of a value: smaller errors say nothing beside four digits of it
 
 
@@ -38,18 +39,28 @@ LEAST_TOLD = 1e-5  # of a value: smaller errors say nothing beside four digits o
 class Extreme:
     """One end of a result's range: its value, the swept numbers (or names) of that variant by name, and in words.
 
-    error: the estimated one, in the unit of the value; NaN where none is known.
+    error: the estimated one, in the unit of the value; NaN where none is known. alike: how many variants have this very
+    value, and how many have any: one of many says nothing.
     """
 
     value: float
     variant: Mapping[str, float | str]
     words: Mapping[str, str]
     error: float = np.nan
+    alike: tuple[int, int] = (1, 1)
 
     @property
     def where(self) -> str:
-        """The variant in words."""
-        return ", ".join(f"{name} {words}" for name, words in self.words.items())
+        """The variant in words, or how many have the same value."""
+        first, (own, of) = ", ".join(f"{name} {words}" for name, words in self.words.items()), self.alike
+        if own > MOST_TIED:
+            return f"in {own:,} of {counted(of, 'variant')}"
+        return f"{first} and {own - 1} more" if own > 1 else first
+
+    @property
+    def at(self) -> str:
+        """The same, to stand behind what it is."""
+        return self.where if self.alike[0] > MOST_TIED else f"at {self.where}"
 
 
 @dataclass(frozen=True)
@@ -233,10 +244,11 @@ def _limited(results: Results) -> list[str]:
 
 
 def in_tables(study_results: Results) -> list[Range]:
-    """The same, but of the axles of a train those alone whose contact forces are the largest and the smallest, and of
-    a dynamic part beside its whole no residual vibration, which is the same."""
+    """The same, but of the axles of a train those alone whose contact forces are the largest and the smallest, of a
+    dynamic part beside its whole no residual vibration, which is the same, and no amplification that answers leave
+    out."""
     alike = {f"{name}_residual" for name in study_results.sensors if has_whole(study_results, name)}
-    found = [one for one in asked(study_results) if one.name not in alike]
+    found = [one for one in asked(study_results) if one.name not in alike and not _untold(study_results, one)]
     for name, train in study_results.study.train.items():
         for end, sign in (("max", 1.0), ("min", -1.0)):
             names = {f"{axle_name(name, axle)}_contact_force_{end}" for axle in range(train.count)}
@@ -244,6 +256,14 @@ def in_tables(study_results: Results) -> list[Range]:
             worst = max(own, key=lambda one: max(sign * one.smallest.value, sign * one.largest.value), default=None)
             found = [one for one in found if one not in own or one is worst]
     return found
+
+
+def _untold(results: Results, found: Range) -> bool:
+    """Whether it is an amplification of what statics are no measure of."""
+    own = found.name == DYNAMIC_AMPLIFICATION.name
+    return (
+        own and results.study.output.keeps_variants and bool(np.isnan(told_amplification(results, found.sensor)).all())
+    )
 
 
 def _range(study_results: Results, name: str, sensor: str, array: xr.DataArray) -> Iterator[Range]:
@@ -295,7 +315,10 @@ def _extreme(results: Results, array: xr.DataArray, flat: np.intp, errors: Array
             else:
                 words[str(name)] = quantity(value, str(coordinate.attrs.get("units", "1")))
     error = np.nan if errors is None else float(errors.reshape(-1)[flat])
-    return Extreme(float(array.values.reshape(-1)[flat]), variant, words, error)
+    value, alike = float(array.values.reshape(-1)[flat]), (1, 1)
+    if array.dims == results.dims:
+        alike = int(np.count_nonzero(array.values == value)), int(np.count_nonzero(np.isfinite(array.values)))
+    return Extreme(value, variant, words, error, alike)
 
 
 _DERIVED = ("speed_ratio", "mass_ratio", "frequency_ratio")

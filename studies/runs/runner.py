@@ -5,7 +5,7 @@ Killed at any moment it leaves finished parts behind, and goes on from them when
 
 import os
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial, singledispatch
@@ -30,6 +30,7 @@ from results_schema.store.archive import (
     write_archive,
 )
 from results_schema.store.parts import PartStore, bytes_so_far
+from studies.protocol.listener import NOBODY, Listener
 from studies.protocol.options import RunOptions
 from studies.protocol.parts import Pieces, Variants, Work
 from studies.protocol.stopping import Stop
@@ -43,7 +44,6 @@ from studies.runs.identity import check_unchanged, files_of, run_key
 from studies.runs.not_audited import why_none, why_none_of_pieces
 from studies.runs.provenance import attributes
 
-Progress = Callable[[int, int], None]
 CHANGES_SHOWN = 3  # of the keys by which an archive's study differs
 AUDITING = "audit: some variants once more with more of everything"
 UNREDUCED = "some variants once more by the unreduced finite-element model"
@@ -73,13 +73,10 @@ def run_to_archive(
     archive: Path,
     options: RunOptions,
     *,
-    progress: Progress | None = None,
-    stage: Callable[[str], None] | None = None,
-    remark: Callable[[Sequence[str]], None] | None = None,
+    listener: Listener = NOBODY,
     stop: Stop | None = None,
 ) -> Outcome:
-    """Run a study and write its archive, or find it finished there. progress, stage, remark: told what is done, what is
-    being done, and before anything is computed what is worth knowing.
+    """Run a study and write its archive, or find it finished there.
 
     Raises BadInput, and OutputFailed where nothing can be written or the disk is too small, before anything is
     computed or written; later Interrupted, OutputFailed and ArchiveBusy with finished work kept; ArchiveError when
@@ -94,14 +91,14 @@ def run_to_archive(
     _look(run)
     parts = kind.parts(study)
     files.check_free(archive.parent, parts.disk_bytes - bytes_so_far(archive), parts.words)
-    (remark or _unheard)(parts.remarks)
+    listener.remark(parts.remarks)
     key, name = run_key(study, parts.names), study.source.name
     with PartStore(archive, key, partial(_look, run), study=name, discard=options.overwrite) as store:
         if _look(run) == "same study, finished":  # somebody else has finished it since the run began
             store.remove()
             return _found_finished(run)
-        with place(**options.where) as here, told_of_compiling(stage or _unheard):
-            work = Work(None, stop, progress, None, stage, here)
+        with place(**options.where) as here, told_of_compiling(listener.stage):
+            work = Work(None, stop, listener, place=here)
             resumed = parts.compute(store, work)
             work.check()
             root = _as_declared(parts.gather(store), study)
@@ -110,10 +107,6 @@ def run_to_archive(
     return Outcome(
         archive, root, resumed, False, seconds, tuple(parts.remarks), groups.get(GROUP), groups.get(unreduced.GROUP)
     )
-
-
-def _unheard(words: object) -> None:
-    """Nobody wants to know."""
 
 
 class _Run(NamedTuple):
@@ -138,14 +131,14 @@ def _of_variants(parts: Variants, root: xr.Dataset, work: Work) -> Mapping[str, 
     from engine.batch.dataset import model_groups
 
     plan = parts.plan
-    work.stage(AUDITING)
+    work.listener.stage(AUDITING)
     audit = audit_group(plan, parts.to_audit(root), work)
     root.attrs.update({} if audit else why_none(plan))
     models = model_groups(plan.base)
     if plan.study.output.keeps_variants:
         models = with_first_frequency(models, Results(root, plan.study))
     if plan.study.output.unreduced:
-        work.stage(UNREDUCED)
+        work.listener.stage(UNREDUCED)
     return models | unreduced.unreduced_group(plan, root, work.check) | audit
 
 
@@ -155,7 +148,7 @@ def _of_pieces(parts: Pieces, root: xr.Dataset, work: Work) -> Mapping[str, xr.D
     from engine.batch.dataset import model_groups
 
     if parts.audited:
-        work.stage(AUDITING)
+        work.listener.stage(AUDITING)
     audit = audit_group_of_pieces(parts, root, work)
     root.attrs.update({} if audit else why_none_of_pieces(parts))
     return model_groups(base_scene(parts.study)) | audit

@@ -99,6 +99,20 @@ def test_a_long_run_tells_how_far_it_is_where_no_terminal_shows_a_bar(capsys: py
     assert re.fullmatch(r"small: marching; 80 of 400 after 0.\d+ s, about \d\S* s left", lines[-1])
 
 
+def test_it_is_told_how_many_pilots_are_measured_before_any_variant_is_finished(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Also after kernels were compiled meanwhile, which else would be said until the end."""
+    with progress_bar("small", seconds=0.01) as bar:
+        bar.say("choosing")
+        bar.show(0, 400)
+        bar.say(WORDS)
+        bar.note("pilots of 3 of 24 scenes measured")
+        time.sleep(0.2)
+    lines = capsys.readouterr().err.splitlines()
+    assert re.fullmatch(r"small: choosing, pilots of 3 of 24 scenes measured; 0 of 400 after 0.\d+ s", lines[-1])
+
+
 def test_the_progress_bar_is_for_terminals(tmp_path: Path) -> None:
     write(tmp_path)
     assert finish(tmp_path, "run", "small.toml", "-o", "quiet.nc").stderr in ("", f"small: {WORDS}\n")

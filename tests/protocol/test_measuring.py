@@ -22,6 +22,7 @@ from results_schema.store.archive import open_archive
 from results_schema.store.parts import PartStore, finished_so_far
 from results_schema.store.tables import Table, from_dataset, to_dataset
 from studies.commands.cli import main
+from studies.protocol.listener import Listener
 from studies.protocol.options import RunOptions
 from studies.protocol.parts import Memory, Piece, Pieces, Work
 from studies.protocol.stopping import Stop
@@ -68,7 +69,7 @@ def parts(*own: Piece) -> Pieces:
 def test_pieces_are_computed_in_their_order_and_handed_over() -> None:
     shown: list[tuple[int, int]] = []
     own, store = parts(piece("b", 2.0), piece("a", 1.0)), Memory()
-    assert own.compute(store, Work(progress=lambda finished, total: shown.append((finished, total)))) == 0
+    assert own.compute(store, Work(listener=Listener(lambda finished, total: shown.append((finished, total))))) == 0
     assert list(store.finished()) == ["b", "a"] and shown == [(0, 2), (1, 2), (2, 2)]
     assert dict(own.gather(store).data_vars) == {"b": 2.0, "a": 1.0}
 
@@ -82,7 +83,7 @@ def test_a_stop_between_pieces_keeps_the_finished_ones(number: signal.Signals) -
             stop.ask(number.value)
 
     with pytest.raises(Interrupted) as caught:
-        parts(piece("a"), piece("b")).compute(store, Work(stop=stop, progress=ask))
+        parts(piece("a"), piece("b")).compute(store, Work(stop=stop, listener=Listener(ask)))
     assert list(store.finished()) == ["a"] and caught.value.exit_code == 128 + number
 
 

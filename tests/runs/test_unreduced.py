@@ -14,6 +14,7 @@ from results_schema.validate import validate
 from results_schema.variables import expand
 from studies.commands.preview import preview
 from studies.commands.screens import show_outcome
+from studies.protocol.listener import Listener
 from studies.protocol.options import RunOptions
 from studies.protocol.study import kind_of
 from studies.reporting.report import write_report
@@ -155,7 +156,7 @@ def test_a_force_that_is_rounding_beside_others_has_no_range() -> None:
 def test_a_run_and_what_is_foreseen_say_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """While it is computed, when it is done, and when it is found finished; `check` foresees its time apart."""
     stages: list[str] = []
-    first = run_to_archive(table_study(), tmp_path / "found.nc", RunOptions(), stage=stages.append)
+    first = run_to_archive(table_study(), tmp_path / "found.nc", RunOptions(), listener=Listener(stage=stages.append))
     assert UNREDUCED in stages
     again = run_to_archive(table_study(), tmp_path / "found.nc", RunOptions())
     assert not first.was_finished and again.was_finished

@@ -26,6 +26,7 @@ from studies.pictures.common.figures import (
     shades,
     telling_limits,
 )
+from studies.pictures.common.maps import Mapped, maps
 from studies.pictures.common.sizes import FAR
 from studies.pictures.common.sweep_view import View, along_axis, coincide, draw_curves, one_legend, view
 from studies.pictures.common.traces import coarse, per_period, picked, since_rest
@@ -41,7 +42,8 @@ BAND = 0.3  # of their colour that bands have together
 
 class Row(NamedTuple):
     """A panel over the sweep: values and estimated errors in the sweep's shape, their unit, what stands beside the axis
-    in a unit, a limit of the values, and where the axis begins (None: where they do)."""
+    in a unit, a limit of the values, where the axis begins (None: where they do), and what the smallest value is called
+    where it is looked for."""
 
     sensor: str
     values: Array
@@ -50,6 +52,7 @@ class Row(NamedTuple):
     label: Callable[[str], str]
     limit: float | None = None
     base: float | None = 0.0
+    best: str = ""
 
 
 def pictures(results: Results, asked: AskedOfRest) -> list[Figure]:
@@ -100,7 +103,8 @@ def _settling(results: Results, sensors: list[str], asked: AskedOfRest) -> list[
         name = names_of_times(sensor)[with_move]
         limit, base = (None, None) if with_move else (asked.settling_time, 0.0)
         errors = absolute_errors(results, name)
-        rows.append(Row(sensor, settling_of(results, name), errors, "s", label.format, limit, base))
+        best = "the shortest" if with_move else ""
+        rows.append(Row(sensor, settling_of(results, name), errors, "s", label.format, limit, base, best))
         bands.append(f"{sensor.replace('_', ' ')} {quantity(float(known[sensor].settling_band or 0.0), 'm')}")
     longest, least = (quantity(float(end(rows[0].values)), "s") for end in (np.nanmax, np.nanmin))
     caption = (
@@ -125,8 +129,19 @@ def _over_sweep(results: Results, name: str, rows: list[Row], title: str, words:
     said, *more = words
     caption = seen.caption(said, f"{'Bars' if seen.is_sampled else 'Bands'}: the estimated error.", *more)
     height = 0.9 + 1.9 * len(rows)
-    title = f"{title},{in_words(results, top)}"
-    return [telling_limits(draw(name, title, caption, height, partial(_draw_sweep, seen, rows)))]
+    curves = draw(name, f"{title},{in_words(results, top)}", caption, height, partial(_draw_sweep, seen, rows))
+    return [telling_limits(curves), *_map(results, name, rows[0], said)]
+
+
+def _map(results: Results, name: str, row: Row, said: str) -> list[Figure]:
+    """The first row over two swept numbers, where these have many values."""
+    ends = extreme(row.values), extreme(-row.values)
+    assert ends[0] is not None and ends[1] is not None
+    place, told = (ends[1], "shortest") if row.best else (ends[0], "largest")
+    value = quantity(float(row.values[place]), row.units)
+    what = row.label("").replace("\n", " ").replace(" ()", "")
+    title = f"{row.sensor.replace('_', ' ')}: the {told} {what} is {value},{in_words(results, place)}"
+    return maps(results, Mapped(row.values, row.units, row.label, row.limit, row.best), name, title, said)
 
 
 def _draw_sweep(seen: View, rows: list[Row], drawing: Drawing) -> None:

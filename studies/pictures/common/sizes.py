@@ -11,7 +11,7 @@ from matplotlib.figure import Figure as Drawing
 
 from engine.scene.study import Study
 from engine.scene.trains import axle_name
-from studies.findings.amplification import largest, size_errors, sizes
+from studies.findings.amplification import largest, size_errors, sizes, told_amplification
 from studies.findings.effects import HARDLY, hardly_changed
 from studies.findings.in_step import InStep, speeds_in_step
 from studies.pictures.common.figures import FLAT, INK, Figure, draw, limit_far, limit_line, telling_limits
@@ -31,10 +31,10 @@ FAR = 2.0  # times the largest value: a limit beyond is told in words, as curves
 
 
 def gain(results: Results, sensor: str) -> Any:
-    """The dynamic amplification of a sensor, over the sweep; NaN where the kind of study has none."""
-    if "dynamic_amplification" not in results.dataset:
-        return results.dataset["status"].copy(data=np.full(results.shape, np.nan))
-    return results.of_sensor("dynamic_amplification", sensor)
+    """The dynamic amplification of a sensor, over the sweep; NaN where it is not told."""
+    known = "dynamic_amplification" in results.dataset
+    own = told_amplification(results, sensor) if known else np.full(results.shape, np.nan)
+    return results.dataset["status"].transpose(*results.dims).copy(data=own)
 
 
 def speed_ratio(axes: Any, seen: View) -> None:
