@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from results_schema.errors import Remark
+    from studies.findings.absolute_errors import errors
     from studies.protocol.study import Kind, kind_named, kind_names, run
     from studies.reporting.answers import answer, figures
+    from studies.reporting.comparison import compare
     from studies.reporting.report import report
     from studies.runs.datasets import write
 
@@ -24,11 +26,25 @@ _HOMES = {
     "run": "studies.protocol.study",
     "answer": "studies.reporting.answers",
     "figures": "studies.reporting.answers",
+    "errors": "studies.findings.absolute_errors",
+    "compare": "studies.reporting.comparison",
     "write": "studies.runs.datasets",
     "report": "studies.reporting.report",
     "Remark": "results_schema.errors",
 }
-__all__ = ["Kind", "Remark", "answer", "figures", "kind_named", "kind_names", "report", "run", "write"]
+__all__ = [
+    "Kind",
+    "Remark",
+    "answer",
+    "compare",
+    "errors",
+    "figures",
+    "kind_named",
+    "kind_names",
+    "report",
+    "run",
+    "write",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -111,3 +111,46 @@ def test_values_of_an_axis_are_any_array_of_one_dimension() -> None:
     for values in (np.ones((2, 2)), np.ones((2, 2)) * pint.UnitRegistry().kg):
         said = refused(whole.with_values, {"sweep": {"mass": {"of": mass, "values": values}}})
         assert "sweep.mass.values.0: the values of an axis are one-dimensional" in said and "ravel" in said
+
+
+def test_errors_in_units_of_the_results() -> None:
+    """An archive has them as parts of a scale: of readings of the largest static value, as their amplification tells
+    it."""
+    found = studies.run(scenes.study("passage"))
+    told, parts = studies.errors(found), found.estimated_error
+    static = found.midspan_max / found.dynamic_amplification.sel(sensor="midspan")
+    assert float(np.abs(found.midspan_min / found.midspan_max).max()) < 1.0  # so that the largest is the maximum
+    np.testing.assert_allclose(told.midspan_max, parts.sel(result="midspan_max") * static, rtol=1e-6)
+    amplified = told.dynamic_amplification.sel(sensor="midspan")
+    np.testing.assert_allclose(amplified, parts.sel(result="dynamic_amplification midspan"), rtol=1e-6)
+    assert told.midspan_max.attrs["units"] == "m" and told.midspan_max.dims == found.midspan_max.dims
+    assert set(told) <= set(found) and "work" not in told
+
+
+def test_two_datasets_are_compared_as_archives_are() -> None:
+    first = studies.run(scenes.study("passage"))
+    assert studies.compare(first, first).agree
+    other = studies.compare(first, first.assign(midspan_max=2.0 * first.midspan_max))
+    doubled = next(one for one in other.differences if one.name == "midspan_max")
+    assert not other.agree and doubled.beyond == first.status.size
+
+
+@pytest.mark.parametrize("call", [studies.answer, studies.figures])
+def test_what_joins_several_studies_has_no_sentences_of_one(call: Any) -> None:
+    """The new axis was left out of them without a word, and figures ended in a ValueError."""
+    found = studies.run(scenes.study("passage"))
+    assert "rope: this dataset joins the results of several studies" in refused(call, xr.concat([found, found], "rope"))
+    assert "status: this dataset has lost the status" in refused(call, found.drop_vars("status"))
+
+
+@pytest.mark.parametrize("run", RUNS)
+@pytest.mark.parametrize("chunk", [0, -1, "a", 1.5, True])
+def test_a_chunk_is_a_number_of_variants(run: Any, chunk: Any) -> None:
+    assert "chunk: this is no number of variants; expected 1 or more" in refused(
+        run, scenes.study("passage"), chunk=chunk
+    )
+
+
+def test_a_dict_is_no_file_and_a_number_no_key() -> None:
+    assert "engine.Study(**tables) takes the tables of a dict" in refused(engine.load, {})
+    assert "1: unknown key" in refused(scenes.study("passage").with_values, {1: 1})

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from engine.accuracy.climb import Climb, Measured
 from engine.accuracy.grids import SceneGrid
-from engine.accuracy.jobs import Crashed, Halted, Job, Share, Told, over_scenes
+from engine.accuracy.jobs import Crashed, Halted, Job, Share, Told, over_scenes, untold
 from engine.accuracy.ladder import Ladder, ladder_of
 from engine.accuracy.neighbour_errors import (
     TELLING,
@@ -170,7 +170,7 @@ class Kept(Protocol):
         """Keep it."""
 
 
-def find(pilots: Pilots, members: Sequence[Counts], drawn: Counts, share: Share, told: Told | None = None) -> Found:
+def find(pilots: Pilots, members: Sequence[Counts], drawn: Counts, share: Share, told: Told = untold) -> Found:
     """What some ``drawn`` pilots of a sweep, whose scenes' variants are ``members``, find; told: of how many scenes are
     done. Raises Halted, and Crashed by flat numbers of pilots."""
     parts = [drawn[np.isin(drawn, part)] for part in members]

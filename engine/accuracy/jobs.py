@@ -14,6 +14,10 @@ Halted = Callable[[], bool]
 Told = Callable[[int, int], object]  # how many are done, and of how many
 
 
+def untold(done: int, of: int) -> None:
+    """Nobody asks how many are done."""
+
+
 @dataclass(frozen=True)
 class Job(Generic[T]):
     """Work on some variants of a subject. function: of the subject, the lanes and what tells whether to give up;
@@ -27,9 +31,9 @@ class Job(Generic[T]):
 class Share(Protocol):
     """What does jobs: in turn, on threads, or in other processes."""
 
-    def __call__(self, subject: Any, jobs: Sequence[Job[T]]) -> Iterable[T]:
-        """What jobs on a subject find, in any order, each finding saying what it is of. A job may be cut. Raises
-        Halted, and Crashed where some variants end the process that computes them."""
+    def __call__(self, subject: Any, jobs: Sequence[Job[T]], told: Told = untold) -> Iterable[T]:
+        """What jobs on a subject find, in any order, each finding saying what it is of. A job may be cut. told: of how
+        many are done. Raises Halted, and Crashed where some variants end the process that computes them."""
 
 
 class Crashed(Exception):
@@ -41,7 +45,7 @@ class Crashed(Exception):
 
 
 def over_scenes(
-    share: Share, subject: Any, function: Callable[..., T], parts: Sequence[Counts], told: Told | None = None
+    share: Share, subject: Any, function: Callable[..., T], parts: Sequence[Counts], told: Told = untold
 ) -> list[T]:
     """What a function of the subject, some variants, what shares their jobs out and their scene finds of every scene's
     part of the variants, in any order. told: of how many of several scenes are done.
@@ -52,12 +56,7 @@ def over_scenes(
     if len(scenes) == 1:
         return [function(subject, part, share, scene) for scene, part in scenes]
     jobs = [Job(partial(_whole_scene, function=function, scene=scene), part) for scene, part in scenes]
-    found = list[T]()
-    for one in share(subject, jobs):
-        found.append(one)
-        if told is not None:
-            told(len(found), len(jobs))
-    return found
+    return list(share(subject, jobs, told))
 
 
 def _whole_scene(subject: Any, lanes: Counts, halted: Halted, function: Callable[..., T], scene: int) -> T:
@@ -70,6 +69,10 @@ class InTurn:
 
     halted: Halted = lambda: False
 
-    def __call__(self, subject: Any, jobs: Sequence[Job[T]]) -> list[T]:
+    def __call__(self, subject: Any, jobs: Sequence[Job[T]], told: Told = untold) -> list[T]:
         """What the jobs find, in their order."""
-        return [job.function(subject, job.lanes, self.halted) for job in jobs]
+        found = list[T]()
+        for job in jobs:
+            found.append(job.function(subject, job.lanes, self.halted))
+            told(len(found), len(jobs))
+        return found

@@ -15,8 +15,8 @@ import numpy as np
 
 from engine.accuracy.choice import Kept
 from engine.accuracy.grids import SceneGrid
-from engine.accuracy.jobs import Crashed, Halted, Job
-from engine.batch.executors import Place, Shared, Threads, Where, check_options, cores, place, run_jobs
+from engine.accuracy.jobs import Crashed, Halted, Job, Told, untold
+from engine.batch.executors import Place, Shared, Threads, Where, check_chunk, check_options, cores, place, run_jobs
 from engine.batch.plan import EVERY_MARCH, NOBODY, Plan, check_memory, make_plan
 from engine.linear_algebra import one_thread
 from engine.march.march import March, prepare
@@ -57,6 +57,7 @@ def run(
     from engine.batch.plausibility import remarks
 
     check_options(where, "chunk", "reduction", "results", "progress")
+    check_chunk(chunk)
     study = study_of(study)
     plan = make_plan(study, reduction=reduction, results=results)
     check_memory(study, plan.size, plan.disk_bytes)
@@ -113,7 +114,7 @@ def warm_up(plan: Plan) -> None:
 
 
 def choose(
-    plan: Plan, here: Place, stop: threading.Event | None, kept: Kept | None = None, told: Progress | None = None
+    plan: Plan, here: Place, stop: threading.Event | None, kept: Kept | None = None, told: Told = untold
 ) -> None:
     """What the variants are computed with, measured by pilots, unless what these found is ``kept``; those that end
     every process are left out. told: of how many scenes of pilots are done. Raises Interrupted when ``stop`` is set."""

@@ -16,7 +16,7 @@ from typing import Any, Protocol, TypedDict, TypeVar
 
 import numpy as np
 
-from engine.accuracy.jobs import Crashed, Halted, Job
+from engine.accuracy.jobs import Crashed, Halted, Job, Told, untold
 from engine.linear_algebra import one_thread
 from engine.march.stepper import Halted as Gone
 from results_schema.arrays import Counts
@@ -122,6 +122,12 @@ def check_options(given: Iterable[str], *known: str) -> None:
             raise BadInput("unknown option", where=name, expected=expected, remedy=nearest(name, options))
 
 
+def check_chunk(chunk: object) -> None:
+    """Refuse a number of variants that is none. Raises BadInput."""
+    if chunk is not None and (isinstance(chunk, bool) or not isinstance(chunk, int) or chunk < 1):
+        raise BadInput("this is no number of variants", where="chunk", expected="1 or more", received=str(chunk))
+
+
 def cores() -> int:
     """Threads where nobody says how many."""
     return os.cpu_count() or 1
@@ -134,10 +140,15 @@ class Shared:
     place: Place
     halted: Halted = lambda: False
 
-    def __call__(self, subject: Any, jobs: Sequence[Job[T]]) -> list[T]:
+    def __call__(self, subject: Any, jobs: Sequence[Job[T]], told: Told = untold) -> list[T]:
         """What the jobs find, in the order in which they end."""
         found: list[T] = []
-        crashed = self.place.share_out(subject, jobs, found.append, self.halted)
+
+        def take(one: T) -> None:
+            found.append(one)
+            told(min(len(found), len(jobs)), len(jobs))  # a job may have been cut
+
+        crashed = self.place.share_out(subject, jobs, take, self.halted)
         if crashed:
             raise Crashed(np.concatenate(crashed))
         return found

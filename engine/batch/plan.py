@@ -16,7 +16,7 @@ import numpy as np
 from engine.accuracy.choice import PILOTS, Choice, Kept, Pilots, choose, find, pilots_of, tolerance_span
 from engine.accuracy.grids import KEPT_CYCLE, SceneGrid, unit_steps
 from engine.accuracy.groups import ConvergingGroup, Group, on_rungs
-from engine.accuracy.jobs import Share, Told
+from engine.accuracy.jobs import Share, Told, untold
 from engine.accuracy.ladder import share_ladder
 from engine.accuracy.reference import USUAL_LEVEL, in_full, level_work
 from engine.accuracy.results import results_of
@@ -129,7 +129,7 @@ class Plan:
         pilots: int = PILOTS,
         without: Counts = NOBODY,
         kept: Kept | None = None,
-        told: Told | None = None,
+        told: Told = untold,
     ) -> None:
         """Measure pilots, at most so many and ``without`` some variants, and choose, where the study has many variants.
         ``kept``: where what pilots found is kept, if anywhere; told: of how many of their scenes are done. Raises

@@ -29,7 +29,7 @@ def value_in(scene: Spec, path: str) -> Any:
 
 def with_value(data: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
     """Plain data with another value at a dotted key; what is not on the way is shared. KeyError where it cannot be."""
-    return _replaced(data, path.split("."), value, path)  # type: ignore[no-any-return]
+    return _replaced(data, str(path).split("."), value, path)  # type: ignore[no-any-return]
 
 
 def numbers_in(value: Any, here: str = "") -> Iterator[tuple[str, float]]:

@@ -120,9 +120,12 @@ def write_document(data: Mapping[str, Any]) -> str:
     return "\n".join(block for block in blocks if block)
 
 
-def _file_bytes(path: str | Path) -> bytes:
+def _file_bytes(path: Any) -> bytes:
     from results_schema.store.files import SIGNATURE
 
+    if not isinstance(path, str | Path):
+        expected, remedy = "the path of a study file, or its text", "engine.Study(**tables) takes the tables of a dict"
+        raise BadInput("this is no file", where="study", expected=expected, received=type(path).__name__, remedy=remedy)
     name = str(path)
     try:
         if not S_ISREG(Path(path).stat().st_mode):

@@ -44,6 +44,7 @@ _COMMON = {
     for name, factor in names.items()
 }  # what pint says of them, which takes half a second to import
 JERK = "m s-3"
+KNOWN_UNITS = "a unit such as m, mm, kN, GPa, km/h, Hz"
 _RIGID = ("rigid", "fixed", "infinite", "infinity", "inf")
 _RUN_TOGETHER = {"kmh": "km/h", "kph": "km/h", "mps": "m/s", "nm": "N m", "knm": "kN m"}
 _RUN_TOGETHER |= dict.fromkeys(("mu", "my", "µ", "mum"), "um")
@@ -182,11 +183,12 @@ def _named_by_pint(name: str) -> tuple[Fraction, Mapping[str, int]]:
 
     if name.casefold() in ("ton", "tons"):  # which pint takes for 907 kg
         raise fault("a ton is one of several sizes", expected='"t" (1,000 kg) or "kg"', received=shortened(name))
+    if name.endswith("s") and name[:-1] in _COMMON:  # which pint takes for a plural
+        raise fault("no such unit", expected=KNOWN_UNITS, received=shortened(name), remedy=_meant(name[:-1]))
     try:
         quantity = _registry().Quantity(Fraction(1), name).to_base_units()
     except (PintError, TypeError, ValueError, AssertionError):
-        expected = "a unit such as m, mm, kN, GPa, km/h, Hz"
-        raise fault("no such unit", expected=expected, received=shortened(name), remedy=_meant(name)) from None
+        raise fault("no such unit", expected=KNOWN_UNITS, received=shortened(name), remedy=_meant(name)) from None
     base = {key: int(power) for key, power in dict(quantity._units).items()}
     if not set(base) <= {*_BASE, "radian"} or not isinstance(quantity.magnitude, Fraction):
         expected = "a unit of metres, kilograms, seconds"

@@ -18,6 +18,7 @@ STARTS = Path(__file__).parents[1] / "study_templates"
 MEASURED = LIBRARY / "measured.json"  # what `python -m tests.gallery` found of every built-in study
 COMMAND = "#     wanderlast "  # how a line with an example command begins
 EVERY_STUDY = STARTS / "every-study.part"
+TABLES = (".csv", ".parquet")  # endings of what `export` writes
 
 
 @dataclass(frozen=True)
@@ -83,6 +84,14 @@ def refuse_study(path: Path) -> None:
         what = f"this is a {'built-in study' if is_built_in else 'study file'}, not an archive of results"
         remedy = f"first wanderlast run {path}, then the same with {path.stem}.nc"
         raise BadInput(what, where=str(path), expected="an archive (.nc)", remedy=remedy)
+
+
+def refuse_table(archive: Path | None) -> None:
+    """Refuse the name of a table as that of an archive. Raises BadInput."""
+    if archive is not None and archive.suffix in TABLES:
+        own = archive.with_suffix(".nc")
+        remedy = f"-o {own}, then wanderlast export {own} {archive}"
+        raise BadInput("run writes archives, and this is the name of a table", where=str(archive), remedy=remedy)
 
 
 def as_typed(study: str) -> str:

@@ -183,7 +183,7 @@ def compare(first: Path, second: Path) -> int:
     """
     from results_schema.store.archive import open_archive
     from studies.commands import screens
-    from studies.reporting.comparison import compare as compared
+    from studies.reporting.comparison import compared
     from studies.runs.archived import results_of
 
     found = compared(results_of(open_archive(first)), results_of(open_archive(second)))
@@ -281,6 +281,7 @@ def _run(study: str, archive: Path | None, options: RunOptions) -> Outcome:
         from studies.runs.runner import run_to_archive
 
         path = catalogue.find_study(study)
+        catalogue.refuse_table(archive)
         loaded = engine.load(path)
         with console.progress_bar(path.stem) as bar:
             listener = Listener(bar.show, bar.say, bar.note, screens.warn_of)

@@ -11,6 +11,7 @@ from results_schema.lazy_imports import xr
 from results_schema.quantities import AFTER_STOP
 from studies.findings.theory import body_mass
 from studies.protocol.study import kind_named
+from studies.results.cells import single_numbers
 from studies.results.formatting import quantity
 from studies.results.results import Results
 
@@ -18,6 +19,37 @@ LOOSE_PART = 0.1  # of a value: an estimated error above stands beside it
 LEAST_PART = 0.1  # of the true value, that what is reported counts as at least: beyond nothing is known
 OF_TOOLS = ("error_moving", "error_working", "error_holding")
 OF_RAILS = ("deflection_largest", "stress_largest")
+
+
+def errors(dataset: xr.Dataset) -> xr.Dataset:
+    """The estimated error of every result of a study's dataset, in the result's own unit: variables of the same names
+    over the same sweep (and sensors), NaN where no estimate exists. Raises BadInput where the dataset is none of a
+    study."""
+    results, found = Results.of(dataset), dict[str, list[xr.DataArray]]()
+    if "estimated_error" not in results.dataset or not results.study.output.keeps_variants:
+        return xr.Dataset(attrs={"title": "no estimates of errors"})
+    for name, sensor, array in single_numbers(results.dataset):
+        if set(array.dims) == set(results.dims) and f"{name} {sensor}".strip() in results.dataset["result"].values:
+            attributes = {"long_name": f"estimated error of {name}", "units": _unit(results, array, sensor)}
+            own = array.transpose(*results.dims).copy(data=absolute_errors(results, name, sensor))
+            found.setdefault(name, []).append(own.assign_attrs(attributes))
+    return xr.Dataset({name: _joined(results.dataset[name], parts) for name, parts in found.items()})
+
+
+def _unit(results: Results, array: xr.DataArray, sensor: str) -> str:
+    """The unit of a result, or of its sensor."""
+    own = str(array.attrs.get("units", "") or "1")
+    return own if own != "1" or not sensor else str(results.dataset["sensor_unit"].sel(sensor=sensor).item())
+
+
+def _joined(array: xr.DataArray, parts: list[xr.DataArray]) -> xr.DataArray:
+    """Errors of one result, over its sensors where it is over these."""
+    others = [dim for dim in array.dims if dim not in parts[0].dims]
+    if not others:
+        return parts[0]
+    bare = [part.drop_vars("sensor_unit", errors="ignore") for part in parts]
+    known = xr.concat(bare, others[0], coords="different", compat="equals")
+    return known.reindex({others[0]: array[others[0]].values}).transpose(*array.dims)
 
 
 def absolute_errors(results: Results, name: str, sensor: str = "") -> Array:

@@ -79,6 +79,24 @@ def limits_of(study: Study) -> Limits:
     return cast(Limits, question_of(study, kind.settings))
 
 
+def check_limits(study: Study, asked: AskedOfPassages) -> None:
+    """Refuse limits of what nothing reads. Raises BadInput."""
+    wholes = {one.quantity for one in study.sensor.values() if not one.is_dynamic_part}
+    parts = {one.quantity for one in study.sensor.values() if one.is_dynamic_part}
+    along = {one.quantity for one in study.envelope.values()}
+    for key, limits, read in (
+        ("", asked, wholes | along),
+        ("dynamic_part.", asked.dynamic_part, parts),
+        ("residual.", asked.residual, wholes | parts),
+    ):
+        for name in LIMITED:
+            if limits.limit(name) is not None and name not in read:
+                what = f"a limit of {name.replace('_', ' ')}, which nothing here reads"
+                part = ' and part = "dynamic"' * key.startswith("dynamic")
+                remedy = f'a sensor with quantity = "{name}"{part}, or no such limit'
+                raise study.source.fault(f"question.{key}{name}", what, remedy=remedy)
+
+
 def told_limit(
     results: Results, values: Array, limit: float, units: str, axis: Axis | None = None, error: Array | float = 0.0
 ) -> str:
@@ -87,8 +105,9 @@ def told_limit(
     along = axis or results.axis(*PACES)
     said = where_beyond(results, values, limit, along)
     loose = np.where(error > LOOSE * values, error, 0.0)
-    surely, perhaps = (where_beyond(results, values + sign * loose, limit, along) for sign in (-1.0, 1.0))
-    doubt = "" if surely == said == perhaps else f"; with its estimated error perhaps {perhaps}, surely {surely}"
+    either = [where_beyond(results, values + sign * loose, limit, along) for sign in (-1.0, 1.0)]
+    surely, perhaps = (_where_alone(results, values + sign * loose, limit, along) for sign in (-1.0, 1.0))
+    doubt = f"; with its estimated error perhaps {perhaps}, surely {surely}" if either != [said, said] else ""
     top = float(np.nanmax(np.where(results.with_values, values, np.nan), initial=0.0))
     near = f"; at most it is {quantity(top, units)}" if said.startswith("nowhere") and top > NEARLY * limit else ""
     named, opened = f"{quantity(limit, units)}{out_of_reach(limit, top)}", _told_opened(results, values > limit)
@@ -163,6 +182,14 @@ def where_beyond(results: Results, values: Array, threshold: float, axis: Axis |
     if len(set(told.values())) == 1:
         return next(iter(told.values()))
     return "; ".join(f"{text} ({others[0].noun} {others[0].in_words(value)})" for value, text in told.items())
+
+
+def _where_alone(results: Results, values: Array, threshold: float, axis: Axis | None) -> str:
+    """The same along one swept number, whatever the others are."""
+    if axis is None or axis.dim == VARIANT:
+        return where_beyond(results, values, threshold, axis)
+    beyond = np.nan_to_num(np.where(results.with_values, values, np.nan)) > threshold
+    return _along(results, axis, beyond, results.with_values)
 
 
 def _along(results: Results, axis: Axis, beyond: Mask, among: Mask | None = None) -> str:

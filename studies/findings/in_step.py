@@ -1,7 +1,9 @@
-"""Speeds at which the axles of a train push in step with a frequency of the body that they cross, and how strongly."""
+"""Speeds at which the axles of a train push in step with a frequency of the body that they cross, and how strongly;
+whether such a resonance may lie between the speeds of a sweep."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
@@ -15,12 +17,16 @@ from results_schema.arrays import Array, Counts
 from results_schema.lazy_imports import xr
 from results_schema.quantities import QUANTITIES
 from studies.findings.theory import along_track
+from studies.results.axes import VARIANT, Axis
+from studies.results.formatting import ALIKE, percent
+from studies.results.results import Results
 
 #: Speeds that are looked at between the lowest and the highest, and the part of a train's load that has to push in
 #: step to be told: a bogie of two axles does so far from any resonance of the whole train.
 LOOKED_AT, TOLD_IN_STEP = 4096, 0.3
-FEWEST = 3  # axles: what one or two pushes leave is no resonance
+FEWEST = 3  # axles, or loads in a row: what one or two pushes leave is no resonance
 MODES, MOST = 4, 8  # that are looked at, the lowest that move the track; speeds that are told
+WAYS = 4.0  # lengths of a train: the wave along which its axles push the least together is shorter
 LEAST = 0.05  # of the largest swing: what is less builds up to nothing
 ACCELERATION, NO_DECAY = 2, 1e-12  # order by time
 
@@ -64,11 +70,20 @@ def speeds_in_step(
         swings = swings if read else swings / (2.0 * np.pi * frequency) ** 2
         # Of the product: a crossing may cancel what comes in step just where all of it does.
         inside = (swings[1:-1] > swings[:-2]) & (swings[1:-1] >= swings[2:]) & (share[1:-1] >= TOLD_IN_STEP)
+        inside &= speeds[1:-1] < frequency * _longest_way(train)
         at = 1 + np.flatnonzero(inside)
         numbers = zip(speeds[at].tolist(), share[at].tolist(), swings[at].tolist(), strict=True)
         found += [InStep(speed, frequency, part, swing, units) for speed, part, swing in numbers]
     strongest = sorted(found, key=lambda one: one.swing)[-MOST:]
     return sorted((one for one in strongest if one.swing >= LEAST * strongest[-1].swing), reverse=True)
+
+
+def _longest_way(train: Train) -> float:
+    """m in a period, beyond which axles come ever more at once: no rhythm of theirs excites what is so slow."""
+    ways = np.geomspace(train.length / LOOKED_AT, WAYS * train.length, LOOKED_AT)
+    share = train.in_step(ways)
+    least = np.flatnonzero((share[1:-1] < share[:-2]) & (share[1:-1] <= share[2:]))
+    return float(ways[1 + least[-1]]) if least.size else 0.0
 
 
 def _moved(mode: xr.Dataset, readers: Sequence[Sensor | Envelope]) -> float:
@@ -101,3 +116,32 @@ def _per_newton(train: Train, mode: xr.Dataset, speeds: Array) -> Array:
     integral = ends + np.diff(turned, axis=1) @ (np.diff(phi) / np.diff(crossed)) / wave**2  # between two places
     decay = np.maximum(float(mode["damping_ratio"]) * wave * train.length, NO_DECAY)
     return np.asarray(np.abs(integral) * wave * -np.expm1(-decay) / decay)
+
+
+def told_between_speeds(results: Results) -> str:
+    """That peaks may be higher between swept speeds, as a sentence behind another; "" where no loads in a row cross a
+    body of known damping, or speeds stand no farther apart than a resonance is wide: between its half-power points
+    2 zeta of its speed, zeta the lowest damping ratio of the sweep."""
+    axis = results.axis(".motion.speed")
+    if axis is None or axis.dim == VARIANT or not (ratios := _damping(results, axis)):
+        return ""
+    zeta, speeds = min(ratios), np.unique(axis.values)
+    apart = np.diff(speeds)
+    if zeta <= 0.0 or (apart <= (1.0 + ALIKE) * zeta * (speeds[1:] + speeds[:-1])).all():
+        return ""
+    even = np.ptp(apart) <= ALIKE * apart.max()
+    return (
+        f" Speeds stand {'' if even else 'up to '}{axis.in_words(float(apart.max()))} apart; a resonance at "
+        f"{percent(zeta)} damping is about {percent(2.0 * zeta)} of its speed wide, so peaks between them may be "
+        "higher: sweep more closely around the highest."
+    )
+
+
+def _damping(results: Results, speed: Axis) -> list[float]:
+    """The lowest damping ratio of every body that a row of loads crosses whose speed an axis sets; none where each mode
+    has its own."""
+    moved = [results.study.carriage[path.split(".")[1]] for path in speed.paths if path.startswith("carriage.")]
+    loads = Counter(carriage.on for carriage in moved if carriage.motion.passes)
+    crossed = [name for name, count in loads.items() if count >= FEWEST]
+    known = [name for name in crossed if isinstance(results.study.body[name].damping_ratio, float)]
+    return [float(np.min(results.parameter(f"body.{name}.damping_ratio"))) for name in known]

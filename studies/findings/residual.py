@@ -169,17 +169,17 @@ def _shortest(results: Results, sensor: str) -> str:
         axis for axis in results.axes if axis.values.size > 1 and not any(".motion." in one for one in axis.paths)
     ]
     if VARIANT in results.dims or len(others) != 1:
-        return f"move and settling take {_least(results, sensor, values)} at least"
+        return f"move and settling take {_least(results, sensor, values, ' at least')}"
     (axis,), rows = others, list[str]()
     own = results.everywhere(results.dataset[axis.name])
     for value in chosen(np.sort(axis.values).tolist(), MOST_BEST):
         if np.isfinite(among := np.where(own == value, values, np.nan)).any():
-            rows.append(f"{_least(results, sensor, among, axis)} ({axis.noun} {axis.in_words(value)})")
+            rows.append(f"{_least(results, sensor, among, known=axis)} ({axis.noun} {axis.in_words(value)})")
     return f"move and settling take at least {listed(rows)}"
 
 
-def _least(results: Results, sensor: str, values: Array, known: Axis | None = None) -> str:
-    """The smallest of times with its error, and where in the sweep it is, of which one swept number may be known."""
+def _least(results: Results, sensor: str, values: Array, words: str = "", known: Axis | None = None) -> str:
+    """The smallest of times with its error, words, and where in the sweep it is, of which one number may be known."""
     place = extreme(-values)
     assert place is not None
     took, error = float(values[place]), float(absolute_errors(results, names_of_times(sensor)[1])[place])
@@ -189,4 +189,4 @@ def _least(results: Results, sensor: str, values: Array, known: Axis | None = No
         if known is None
         else f" at {', '.join(axis.at(place[results.dims.index(axis.dim)]) for axis in axes)}"
     )
-    return f"{quantity(took, 's')}{told_error(error, took, 's')}{where}"
+    return f"{quantity(took, 's')}{told_error(error, took, 's')}{words}{where}"

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
 
 from engine.scene.study import Study
-from results_schema.arrays import Array, Mask
+from results_schema.arrays import Array
 from results_schema.lazy_imports import xr
 from results_schema.variables import MARCH, declare
-from studies.findings.absolute_errors import absolute_errors, errors_of_size, weight
+from studies.findings.absolute_errors import errors_of_size
 from studies.findings.amplification import (
     DYNAMIC_AMPLIFICATION,
     largest,
@@ -21,13 +20,23 @@ from studies.findings.amplification import (
     with_amplification,
     with_own_weight,
 )
-from studies.findings.between_speeds import told_between_speeds
-from studies.findings.beyond import LIMIT, MOST_TOLD, AskedOfPassages, largest_size, ranked, told_limit, where_beyond
+from studies.findings.beyond import (
+    LIMIT,
+    MOST_TOLD,
+    AskedOfPassages,
+    check_limits,
+    largest_size,
+    ranked,
+    told_limit,
+    where_beyond,
+)
+from studies.findings.contacts import told_contacts, told_uplift
 from studies.findings.effects import by_effect, hardly_changed, told_effects, unchanged
 from studies.findings.envelopes import beyond_sensors, sizes_along, told_along
+from studies.findings.in_step import told_between_speeds
 from studies.findings.residual import check_residual, most_ringing, residuals
 from studies.protocol.study import Kind, question_of
-from studies.results.axes import PACES, VARIANT, Axis
+from studies.results.axes import PACES, VARIANT
 from studies.results.findings_common import (
     check_sensors,
     first_carriage,
@@ -36,15 +45,13 @@ from studies.results.findings_common import (
     uncertainty,
     while_held,
 )
-from studies.results.formatting import ROUNDING, counted, listed, number, quantity, times
-from studies.results.places import Index, chosen, extreme
+from studies.results.formatting import listed, number, quantity, times
+from studies.results.places import Index
 from studies.results.results import Results
 
 MOST_SENSORS = 6
-MOST_GROUPS = 5
 #: A table whose tool is 15 um off its static way is told an amplification of 1.01.
 OF_LARGEST = 'It compares largest values; a sensor with part = "dynamic" reads how far it is from statics on the way.'
-BEYOND = "The equations assume contact: beyond, they say no more."
 
 declare("passage", *MARCH, DYNAMIC_AMPLIFICATION)
 
@@ -63,13 +70,15 @@ class Passage(Kind):
         """Something moves and something is measured."""
         first_carriage(study)
         check_sensors(study)
+        check_limits(study, question_of(study, AskedOfPassages))
         check_residual(study, question_of(study, AskedOfPassages))
 
     def summarise(self, dataset: xr.Dataset, study: Study) -> xr.Dataset:
         return with_amplification(dataset, study)
 
     def findings(self, results: Results) -> list[str]:
-        told, (envelopes, sensors) = (_largest, _amplified, _limited, _uplift), _told(results)
+        envelopes, sensors = _told(results)
+        told = (_largest, _amplified, _limited, partial(told_uplift, of=sensors))
         said = [told_along(results, name) for name in envelopes]
         said += [
             _nothing(results, sensor)
@@ -77,13 +86,11 @@ class Passage(Kind):
             else "".join(tell(results, sensor) for tell in told)
             for sensor in sensors
         ]
-        said = _with_remark(said, told_between_speeds(results))
+        said = _once(OF_LARGEST, _with_remark(said, told_between_speeds(results)))
         if sensors:  # of which those after the first may be cut
             said[len(envelopes)] += _limited_besides(results, sensors[0]) + _amplified_besides(results, sensors[0])
         said[0] += _effects(results, envelopes, sensors)
-        opened = _opened(results)
-        lifted = [_lifted(results, opened)] if opened else []
-        kept = [_closed(results, name, force) for name, force in _contact_forces(results) if name not in opened]
+        lifted, kept = told_contacts(results)
         residual = residuals(results, question_of(results.study, AskedOfPassages))
         return [*residual[:1], *said[:1], *lifted, *residual[1:], *said[1:], *kept, *told_statuses(results)]
 
@@ -220,18 +227,10 @@ def _limited_besides(results: Results, told: str) -> str:
     return f" Of the other sensors {listed(words)} {exceed}."
 
 
-def _uplift(results: Results, sensor: str) -> str:
-    """That a support would be lifted off, and where most; "" where it is pressed, or reads something else."""
-    own = results.study.sensor[sensor]
-    if not own.reads.of_support or own.reads.turns:
-        return ""
-    least = np.where(results.with_values, results.everywhere(results.dataset[f"{sensor}_min"]), np.nan)
-    place = extreme(-least)
-    if place is None or least[place] >= -ROUNDING * sizes(results, sensor)[place]:
-        return ""
-    weight = "" if results.study.body[results.study.body_of(sensor)].own_weight else ", own weight not counted"
-    where = "" if unchanged(results, least) else in_words(results, place)
-    return f" It pulls by up to {quantity(-float(least[place]), 'N')}{where}{weight}."
+def _once(remark: str, said: list[str]) -> list[str]:
+    """Sentences with a remark in the first alone that has it."""
+    first = next((place for place, text in enumerate(said) if remark in text), -1)
+    return [text if place == first else text.replace(f" {remark}", "") for place, text in enumerate(said)]
 
 
 def _with_remark(said: list[str], remark: str) -> list[str]:
@@ -257,83 +256,5 @@ def _value(results: Results, sensor: str, place: Index) -> str:
     then = f" with {results.carriage_name} at {quantity(at, 'm')}" if np.isfinite(at) else ""
     loosely = uncertainty(results, f"{sensor}_{side}", place)
     upward = " (largest in magnitude)" * (sides[side] < 0.0)
-    return f"{quantity(sides[side], results.sensors[sensor])}{upward}{loosely}{then}"
-
-
-def _contact_forces(results: Results) -> Iterator[tuple[str, Array]]:
-    """Carriages with their smallest contact forces, where these are known and tell of lifting off."""
-    for carriage, spec in results.study.carriage.items():
-        if f"{carriage}_contact_force_min" in results.dataset and spec.inertial:
-            force = np.asarray(results.dataset[f"{carriage}_contact_force_min"].values, dtype=np.float64)
-            if np.isfinite(force).any():
-                yield carriage, force
-
-
-def _opened(results: Results) -> dict[str, tuple[Mask, Mask]]:
-    """Where contact forces turn negative and where they are known, by carriage: most variants first."""
-    masks = {name: (np.isfinite(force) & (force < 0.0), np.isfinite(force)) for name, force in _contact_forces(results)}
-    found = [(name, both) for name, both in masks.items() if both[0].any()]
-    return dict(sorted(found, key=lambda one: -np.count_nonzero(one[1][0])))
-
-
-def _lifted(results: Results, opened: dict[str, tuple[Mask, Mask]]) -> str:
-    """Which carriages would lift off, and where the first of them begins to."""
-    (first, masks), *others = opened.items()
-    more = [f"{name} in {int(np.count_nonzero(mask)):,}" for name, (mask, _) in others[:MOST_TOLD]]
-    if left := others[MOST_TOLD:]:
-        more.append(f"{len(left)} more")
-    also = f" So would {listed(more)}." if more else ""
-    return f"{_onset(results, first, *masks)}{also} {BEYOND}"
-
-
-def _closed(results: Results, carriage: str, force: Array) -> str:
-    """The smallest of contact forces that are all positive, and whether that is certain."""
-    least, name = extreme(-force), f"{carriage}_contact_force_min"
-    assert least is not None
-    smallest = f"the smallest contact force is {quantity(float(force[least]), 'N')}"
-    off = absolute_errors(results, name)[least]
-    if off > force[least]:
-        known = f"with an estimated error of {quantity(float(off), 'N')}"
-        return f"Whether {carriage} keeps its contact is not certain: {smallest}, {known}{in_words(results, least)}."
-    loosely = uncertainty(results, name, least)
-    return f"{carriage} keeps its contact everywhere; {smallest}{loosely}{in_words(results, least)}."
-
-
-def _onset(results: Results, carriage: str, opened: Mask, known: Mask) -> str:
-    """From which speed on the contact opens, for up to five masses."""
-    shown = f"{carriage} would lift off in {int(opened.sum()):,} of {counted(int(known.sum()), 'variant')}"
-    speed, group = results.axis(".motion.speed", ".motion.frequency"), results.axis(".mass")
-    if speed is None:
-        return f"{shown}."
-    if VARIANT in (speed.dim, speed.dim if group is None else group.dim):
-        return f"{shown}; {_worst(results, carriage, opened)}."
-    if group is None:
-        return f"{shown}, {_first_speed(results, speed, opened)}."
-    along = results.everywhere(results.dataset[group.name])
-    opening = sorted(set(along[opened].tolist()))
-    told = [
-        f"at {group.in_words(value)} {_first_speed(results, speed, opened & (along == value))}"
-        for value in chosen(opening, MOST_GROUPS)
-    ]
-    calm = group.values[group.values < opening[0]]
-    below = f"; up to {group.in_words(float(calm.max()))} never" if calm.size else ""
-    return f"{shown}: {', '.join(told)}{below}."
-
-
-def _worst(results: Results, carriage: str, opened: Mask) -> str:
-    """The variant whose smallest force is the most negative part of its weight: what points off a grid can tell."""
-    ratio = results.everywhere(results.dataset[f"{carriage}_contact_force_min"] / weight(results, carriage))
-    place = extreme(-np.where(opened, ratio, np.nan))
-    assert place is not None
-    return f"worst is {number(float(ratio[place]))} times the weight{in_words(results, place)}"
-
-
-def _first_speed(results: Results, speed: Axis, opened: Mask) -> str:
-    """The lowest speed at which the contact opens, with its ratio to the critical speed where that says something."""
-    along = results.everywhere(results.dataset[speed.name])
-    first = float(along[opened].min())
-    text = f"first at {speed.in_words(first)}"
-    if "speed_ratio" not in results.dataset.coords or not results.study.has_critical_speed:
-        return text
-    ratio = results.everywhere(results.dataset["speed_ratio"])
-    return f"{text} ({number(float(ratio[opened & (along == first)].min()), 2)} of the critical speed)"
+    brackets = f"{upward}{loosely}".replace(") (", ", ")
+    return f"{quantity(sides[side], results.sensors[sensor])}{brackets}{then}"

@@ -277,11 +277,12 @@ def run(study: Study | str | Path, **options: Any) -> xr.Dataset:
     options: progress and chunk, and where to run, as of `engine.run`. Meanwhile numpy's linear algebra keeps to one
     thread in the whole process.
     """
-    from engine.batch.executors import Where, check_options, place
+    from engine.batch.executors import Where, check_chunk, check_options, place
     from engine.scene.study import study_of
 
     started = time.perf_counter()
     check_options(options, "progress", "chunk")
+    check_chunk(options.get("chunk"))
     study = study_of(study)
     parts, store = kind_of(study).parts(study), Memory()
     parts.check_memory()

@@ -67,7 +67,13 @@ class Comparison:
         return not (self.statuses or self.only_in_one) and not any(found.beyond for found in self.differences)
 
 
-def compare(first: Results, second: Results) -> Comparison:
+def compare(first: xr.Dataset, second: xr.Dataset) -> Comparison:
+    """What differs between two datasets of studies, from memory or from their archives, as the command tells it: its
+    `agree` says whether estimated errors explain all of that. Raises BadInput where they have other axes."""
+    return compared(Results.of(first), Results.of(second))
+
+
+def compared(first: Results, second: Results) -> Comparison:
     """Compare two archives where their sweeps agree. Raises BadInput where these have other axes."""
     for one in (first, second):
         if not one.study.output.keeps_variants:

@@ -122,7 +122,8 @@ def _chosen(results: Results, names: Sequence[str]) -> xr.Dataset:
         if name not in known:
             near = get_close_matches(name, known, n=1)
             remedy = f'did you mean "{near[0]}"?' if near else ""
-            raise BadInput("no such result", where="--results", expected=", ".join(known), received=name, remedy=remedy)
+            expected = f"one of {len(known)} results, which info --all lists"
+            raise BadInput("no such result", where="--results", expected=expected, received=name, remedy=remedy)
     kept = {*names, *(axis.name for axis in results.axes), *dataset.dims, "status"}
     return dataset.drop_vars([name for name in dataset.variables if name not in kept])
 

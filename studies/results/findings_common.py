@@ -128,7 +128,8 @@ def exceeds(results: Results, values: Array, threshold: float) -> str:
 def missed_most(results: Results) -> str:
     """Which result misses its tolerance by most among the variants that say so, as the end of a sentence."""
     for name, (error, asked) in _missed(results).items():
-        return f" (most of all for {name}: {scientific(error)} where {scientific(asked)} was asked)"
+        what = f"the history of {name}" if name in results.sensors else name
+        return f" (most of all for {what}: {scientific(error)} where {scientific(asked)} was asked)"
     return ""
 
 

@@ -31,7 +31,10 @@ def _taken(dataset: xr.Dataset) -> xr.Dataset:
     """A dataset that a user gives, without the fill values that xarray puts on coordinates when it writes files. Raises
     BadInput for what is no dataset of a study."""
     known = isinstance(dataset, xr.Dataset)
-    if not known or "study" not in dataset.attrs or "status" not in dataset:
+    if known and "study" in dataset.attrs and "status" not in dataset:
+        what, remedy = "this dataset has lost the status of its variants", "drop no variable that sentences need"
+        raise BadInput(what, where="status", expected="the dataset as studies.run gives it", remedy=remedy)
+    if not known or "study" not in dataset.attrs:
         raise BadInput(
             "this does not hold the results of a study",
             where="dataset",
@@ -53,6 +56,16 @@ def _check_whole(dataset: xr.Dataset, study: Study) -> None:
     swept = study.sweep.axes if study.output.keeps_variants else {}
     sizes = {name: (axis.size, dataset[name].size) for name, axis in swept.items() if name in dataset}
     cut = [name for name, (whole, there) in sizes.items() if whole != there or not dataset[name].ndim]
+    known = {str(dim) for name in swept if name in dataset for dim in dataset[name].dims}
+    beside = set(dataset["status"].dims) - known if known else set()
+    beside |= set(dataset["tolerance"].dims) - {"result"} if "tolerance" in dataset else set()
+    if joined := sorted(map(str, beside)):
+        raise BadInput(
+            "this dataset joins the results of several studies, and a study's own sentences and figures are of one",
+            where=joined[0],
+            expected=f"the dimensions {', '.join(sorted(known))}" if known else "no such dimension",
+            remedy="ask each of them, or sweep that number in one study",
+        )
     if cut or dataset["status"].dtype.kind != "i":
         raise BadInput(
             "this dataset holds a part of its study's results, or what was computed from them",

@@ -31,6 +31,15 @@ MISTAKES = {
     "second moment in mm4": (
         OTHER.replace("= 1e-6", "= 1e6"), 2, ["body.beam.second_moment", "no beam has this", '"1e+06 mm^4"'],
     ),
+    "a plural of a symbol": (OTHER.replace("= 1e9", '= "9 GPas"'), 2, ["no such unit", 'did you mean "GPa"?']),
+    "a limit of what nothing reads": (
+        SMALL + '[question]\nstress = "100 MPa"\n',
+        2, ["question.stress: a limit of stress, which nothing here reads", 'a sensor with quantity = "stress"'],
+    ),
+    "a limit of dynamic parts alone": (
+        SMALL + "[question]\ndynamic_part = { displacement = 1e-3 }\n",
+        2, ["question.dynamic_part.displacement", 'and part = "dynamic"'],
+    ),
     "modulus without GPa": (OTHER.replace("= 1e9", "= 210"), 0, ["youngs_modulus = 210 Pa", '"210 GPa"']),
     "MPa in place of GPa": (
         SMALL.replace("= 1e9", "= 2.1e8").replace("= 1000.0", "= 7850"), 0, ["youngs_modulus = 2.1e+08 Pa", "denser"],
@@ -249,6 +258,7 @@ def test_no_file_is_proposed_for_its_ending_alone(capsys: pytest.CaptureFixture[
         (["check", "small"], ['did you mean "small.toml"']),
         (["report", "small.toml"], ["study file", "wanderlast run small.toml", "small.nc"]),
         (["info", "small.toml"], ["study file", "wanderlast run small.toml"]),
+        (["run", "small.toml", "-o", "x.csv"], ["the name of a table", "-o x.nc, then wanderlast export x.nc x.csv"]),
         (["report", "passage"], ["built-in study", "wanderlast run passage", "passage.nc"]),
     ],
     ids=" ".join,

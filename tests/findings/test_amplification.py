@@ -139,3 +139,52 @@ def test_sensors_beyond_their_limits_and_supports_that_pull_are_told() -> None:
     other = "middle" if told.startswith("quarter") else "quarter"
     size = float(np.maximum(found[f"{other}_max"], -found[f"{other}_min"]).max())
     assert quarter > 1e-3 and f"Of the other sensors {other} (up to {quantity(size, 'm')}) exceeds its limit." in told
+
+
+def supported(own_weight: bool) -> Study:
+    """A beam on three springs, the left one of which pulls where a load stands beyond the middle, and each is read."""
+    reads = {"displacement": fixed(0.5), "moment": fixed(0.5, "bending_moment"), "rate": fixed(0.5, "velocity")}
+    reads |= {"quarter": fixed(0.25), "more": fixed(0.25, "bending_moment")}
+    reads |= {name: fixed(at, "support_reaction") for name, at in (("middle", 0.4), ("right", 0.8), ("left", 0.0))}
+    bed = beam(supports=[{"at": at, "stiffness": 1e4} for at in (0.0, 0.4, 0.8)], own_weight=own_weight)
+    speeds = {"speed": {"of": "carriage.car.motion.speed", "values": [0.2, 0.4]}}
+    return built(bed, force(0.5, cruise(0.0, 1.0, 0.1)), sensor=reads, sweep=speeds)
+
+
+def test_supports_that_pull_are_told_though_others_press_more() -> None:
+    """The largest reaction is of the middle one, and that of all which pulls most was left out."""
+    found = studies.run(supported(False))
+    told, least = "\n".join(answers.answer(found)), float(found.left_min.min())
+    assert least < -0.01 and "\nleft:" not in told
+    assert f"Of the other supports left pulls by up to {quantity(-least, 'N')} at speed" in told
+    heavy = studies.run(supported(True))
+    lowest = min(("left", "middle", "right"), key=lambda name: float(heavy[f"{name}_min"].min()))
+    assert float(heavy[f"{lowest}_min"].min()) > 0.0
+    told = "\n".join(answers.answer(heavy))
+    of = "" if f"\n{lowest}:" in told else f" of {lowest}"
+    assert (
+        f"No support lifts: the smallest reaction{of} is {quantity(float(heavy[f'{lowest}_min'].min()), 'N')}" in told
+    )
+
+
+def test_a_remark_stands_once_in_an_answer() -> None:
+    sensors = {"midspan": fixed(0.5), "quarter": fixed(0.25), "moment": fixed(0.5, "bending_moment")}
+    speeds = {"speed": {"of": "carriage.car.motion.speed", "values": [0.02, 0.03]}}
+    told = "\n".join(
+        studies.answer(studies.run(built(beam(), force(0.3, cruise(0.0, 1.0, 0.1)), sensor=sensors, sweep=speeds)))
+    )
+    assert told.count("exceeds 1.1 nowhere") == 3 and told.count("It compares largest values") == 1
+
+
+def test_contacts_of_many_carriages_are_one_sentence() -> None:
+    """Eight axles had eight sentences."""
+    train = mass(0.01, cruise(0.0, 1.0, 0.3)) | {"axles": 5, "spacing": 0.1}
+    speeds = {"speed": {"of": "train.tram.motion.speed", "values": [0.2, 0.3]}}
+    found = studies.run(built(beam(), {}, train={"tram": train}, sweep=speeds))
+    least = {f"tram_{n}": float(found[f"tram_{n}_contact_force_min"].min()) for n in range(1, 6)}
+    lowest = min(least, key=lambda name: least[name])
+    (said,) = (text for text in studies.answer(found) if "keep" in text)
+    assert said.startswith(
+        f"5 carriages keep their contact everywhere; the smallest contact force, that of {lowest}, is "
+    )
+    assert quantity(least[lowest], "N") in said

@@ -16,7 +16,7 @@ from results_schema.errors import BadInput
 from results_schema.status import Status
 from studies.pictures.portal import pictures
 from studies.protocol.study import kind_of
-from studies.reporting.comparison import compare
+from studies.reporting.comparison import compared
 from studies.reporting.summary import asked
 from studies.reporting.tabulated import table_of
 from studies.results.results import Results
@@ -308,6 +308,6 @@ def test_results_of_robots_and_rails_are_in_tables_and_compared(found: Any) -> N
     np.testing.assert_array_equal(table["error_moving hanging (m)"], wanted)
     other = found.copy(deep=True)
     other["error_moving"] = 1.5 * other["error_moving"]
-    told = compare(results, Results.of(other))
-    assert not told.agree and compare(results, results).agree
+    told = compared(results, Results.of(other))
+    assert not told.agree and compared(results, results).agree
     assert {one.name for one in told.differences if one.beyond} == {"error_moving portal", "error_moving hanging"}

@@ -1,0 +1,176 @@
+"""Whether carriages keep their contact, and whether supports lift, in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from results_schema.arrays import Array, Mask
+from studies.findings.absolute_errors import absolute_errors, weight
+from studies.findings.amplification import sizes
+from studies.findings.beyond import MOST_TOLD
+from studies.findings.effects import unchanged
+from studies.results.axes import VARIANT, Axis
+from studies.results.findings_common import in_words, uncertainty
+from studies.results.formatting import ROUNDING, counted, listed, number, quantity
+from studies.results.places import chosen, extreme
+from studies.results.results import Results
+
+MOST_GROUPS = 5
+BEYOND = "The equations assume contact: beyond, they say no more."
+
+
+def told_contacts(results: Results) -> tuple[list[str], list[str]]:
+    """Sentences on carriages that would lift off, and on those that keep their contact."""
+    opened = _opened(results)
+    kept = {name: force for name, force in _contact_forces(results) if name not in opened}
+    return [_lifted(results, opened)] if opened else [], _kept(results, kept)
+
+
+def told_uplift(results: Results, sensor: str, of: Sequence[str]) -> str:
+    """That a support would be lifted off, and where most; with the first of some sensors that reads one, that others
+    would which are none of these, or that none lifts where own weight counts. "" for what reads something else."""
+    least = {name: float(np.nanmin(_least(results, name))) for name in results.sensors if _of_support(results, name)}
+    if sensor not in least:
+        return ""
+    said = f" It pulls by up to {_pull(results, sensor)}." if _pulls(results, sensor) else ""
+    if sensor != next(name for name in of if name in least):
+        return said
+    others = sorted((one for one in least if one not in of and _pulls(results, one)), key=lambda one: least[one])
+    if others:
+        words = [f"{one} pulls by up to {_pull(results, one)}" for one in others[:MOST_TOLD]]
+        words += [f"{len(others) - MOST_TOLD} more do"] * (len(others) > MOST_TOLD)
+        return f"{said} Of the other supports {listed(words)}."
+    if any(_pulls(results, one) for one in least) or not results.study.body[results.study.body_of(sensor)].own_weight:
+        return said
+    lowest = min(least, key=lambda one: least[one])
+    place = extreme(-_least(results, lowest))
+    assert place is not None
+    at = "" if lowest == sensor else f" of {lowest}"
+    return f" No support lifts: the smallest reaction{at} is {quantity(least[lowest], 'N')}{in_words(results, place)}."
+
+
+def _of_support(results: Results, sensor: str) -> bool:
+    """Whether it reads a support's force, where any variant has a value."""
+    own = results.study.sensor[sensor].reads
+    return own.of_support and not own.turns and bool(np.isfinite(_least(results, sensor)).any())
+
+
+def _least(results: Results, sensor: str) -> Array:
+    """The smallest values of a sensor, in the sweep's shape; NaN where a variant does not count."""
+    return np.where(results.with_values, results.everywhere(results.dataset[f"{sensor}_min"]), np.nan)
+
+
+def _pulls(results: Results, sensor: str) -> bool:
+    """Whether a support pulls anywhere, by more than rounding."""
+    return bool(np.nanmin(_least(results, sensor)) < -ROUNDING * float(np.nanmax(sizes(results, sensor))))
+
+
+def _pull(results: Results, sensor: str) -> str:
+    """By how much a support pulls at most, where, and what is not counted."""
+    least = _least(results, sensor)
+    place = extreme(-least)
+    assert place is not None
+    weight = "" if results.study.body[results.study.body_of(sensor)].own_weight else ", own weight not counted"
+    where = "" if unchanged(results, least) else in_words(results, place)
+    return f"{quantity(-float(least[place]), 'N')}{where}{weight}"
+
+
+def _contact_forces(results: Results) -> Iterator[tuple[str, Array]]:
+    """Carriages with their smallest contact forces, where these are known and tell of lifting off."""
+    for carriage, spec in results.study.carriage.items():
+        if f"{carriage}_contact_force_min" in results.dataset and spec.inertial:
+            force = np.asarray(results.dataset[f"{carriage}_contact_force_min"].values, dtype=np.float64)
+            if np.isfinite(force).any():
+                yield carriage, force
+
+
+def _opened(results: Results) -> dict[str, tuple[Mask, Mask]]:
+    """Where contact forces turn negative and where they are known, by carriage: most variants first."""
+    masks = {name: (np.isfinite(force) & (force < 0.0), np.isfinite(force)) for name, force in _contact_forces(results)}
+    found = [(name, both) for name, both in masks.items() if both[0].any()]
+    return dict(sorted(found, key=lambda one: -np.count_nonzero(one[1][0])))
+
+
+def _lifted(results: Results, opened: dict[str, tuple[Mask, Mask]]) -> str:
+    """Which carriages would lift off, and where the first of them begins to."""
+    (first, masks), *others = opened.items()
+    more = [f"{name} in {int(np.count_nonzero(mask)):,}" for name, (mask, _) in others[:MOST_TOLD]]
+    if left := others[MOST_TOLD:]:
+        more.append(f"{len(left)} more")
+    also = f" So would {listed(more)}." if more else ""
+    return f"{_onset(results, first, *masks)}{also} {BEYOND}"
+
+
+def _kept(results: Results, forces: dict[str, Array]) -> list[str]:
+    """The smallest of contact forces that are all positive, and whether that is certain: of many carriages in one
+    sentence."""
+    least = {name: float(np.nanmin(force)) for name, force in forces.items()}
+    off = {
+        name: float(absolute_errors(results, f"{name}_contact_force_min")[extreme(-forces[name])]) for name in forces
+    }
+    certain = [name for name in forces if not off[name] > least[name]]
+    found = [_doubtful(results, name, forces[name], off[name]) for name in forces if name not in certain]
+    if len(certain) > MOST_TOLD:
+        lowest = min(certain, key=lambda name: least[name])
+        return [*found, f"{len(certain)} carriages keep their contact everywhere; {_lowest(results, lowest, forces)}."]
+    return [*found, *(f"{one} keeps its contact everywhere; {_lowest(results, one, forces, '')}." for one in certain)]
+
+
+def _lowest(results: Results, carriage: str, forces: dict[str, Array], of: str | None = None) -> str:
+    """The smallest contact force of a carriage, which is named where no other words stand for it."""
+    force, who = forces[carriage], f", that of {carriage}," if of is None else of
+    place = extreme(-force)
+    assert place is not None
+    loosely = uncertainty(results, f"{carriage}_contact_force_min", place)
+    return f"the smallest contact force{who} is {quantity(float(force[place]), 'N')}{loosely}{in_words(results, place)}"
+
+
+def _doubtful(results: Results, carriage: str, force: Array, off: float) -> str:
+    """That a contact force may be negative."""
+    place = extreme(-force)
+    assert place is not None
+    smallest = f"the smallest contact force is {quantity(float(force[place]), 'N')}"
+    known = f"with an estimated error of {quantity(off, 'N')}"
+    return f"Whether {carriage} keeps its contact is not certain: {smallest}, {known}{in_words(results, place)}."
+
+
+def _onset(results: Results, carriage: str, opened: Mask, known: Mask) -> str:
+    """From which speed on the contact opens, for up to five masses."""
+    shown = f"{carriage} would lift off in {int(opened.sum()):,} of {counted(int(known.sum()), 'variant')}"
+    speed, group = results.axis(".motion.speed", ".motion.frequency"), results.axis(".mass")
+    if speed is None:
+        return f"{shown}."
+    if VARIANT in (speed.dim, speed.dim if group is None else group.dim):
+        return f"{shown}; {_worst(results, carriage, opened)}."
+    if group is None:
+        return f"{shown}, {_first_speed(results, speed, opened)}."
+    along = results.everywhere(results.dataset[group.name])
+    opening = sorted(set(along[opened].tolist()))
+    told = [
+        f"at {group.in_words(value)} {_first_speed(results, speed, opened & (along == value))}"
+        for value in chosen(opening, MOST_GROUPS)
+    ]
+    calm = group.values[group.values < opening[0]]
+    below = f"; up to {group.in_words(float(calm.max()))} never" if calm.size else ""
+    return f"{shown}: {', '.join(told)}{below}."
+
+
+def _worst(results: Results, carriage: str, opened: Mask) -> str:
+    """The variant whose smallest force is the most negative part of its weight: what points off a grid can tell."""
+    ratio = results.everywhere(results.dataset[f"{carriage}_contact_force_min"] / weight(results, carriage))
+    place = extreme(-np.where(opened, ratio, np.nan))
+    assert place is not None
+    return f"worst is {number(float(ratio[place]))} times the weight{in_words(results, place)}"
+
+
+def _first_speed(results: Results, speed: Axis, opened: Mask) -> str:
+    """The lowest speed at which the contact opens, with its ratio to the critical speed where that says something."""
+    along = results.everywhere(results.dataset[speed.name])
+    first = float(along[opened].min())
+    text = f"first at {speed.in_words(first)}"
+    if "speed_ratio" not in results.dataset.coords or not results.study.has_critical_speed:
+        return text
+    ratio = results.everywhere(results.dataset["speed_ratio"])
+    return f"{text} ({number(float(ratio[opened & (along == first)].min()), 2)} of the critical speed)"
