@@ -34,14 +34,16 @@ def told_uplift(results: Results, sensor: str, of: Sequence[str]) -> str:
     least = {name: float(np.nanmin(_least(results, name))) for name in results.sensors if _of_support(results, name)}
     if sensor not in least:
         return ""
-    said = f" It pulls by up to {_pull(results, sensor)}." if _pulls(results, sensor) else ""
+    weight = "" if results.study.body[results.study.body_of(sensor)].own_weight else ", own weight not counted"
+    said = f" It pulls by up to {_pull(results, sensor)}{weight}." if _pulls(results, sensor) else ""
     if sensor != next(name for name in of if name in least):
         return said
     others = sorted((one for one in least if one not in of and _pulls(results, one)), key=lambda one: least[one])
     if others:
-        words = [f"{one} pulls by up to {_pull(results, one)}" for one in others[:MOST_TOLD]]
-        words += [f"{len(others) - MOST_TOLD} more do"] * (len(others) > MOST_TOLD)
-        return f"{said} Of the other supports {listed(words)}."
+        first, *rest = [f"by up to {_pull(results, one)}" for one in others[:MOST_TOLD]]
+        words = [f"{others[0]} pulls {first}", *(f"{one} {by}" for one, by in zip(others[1:], rest, strict=False))]
+        words += [f"{len(others) - MOST_TOLD} more by less"] * (len(others) > MOST_TOLD)
+        return f"{said} Of the other supports {listed(words)}{'' if said else weight}."
     if any(_pulls(results, one) for one in least) or not results.study.body[results.study.body_of(sensor)].own_weight:
         return said
     lowest = min(least, key=lambda one: least[one])
@@ -68,13 +70,12 @@ def _pulls(results: Results, sensor: str) -> bool:
 
 
 def _pull(results: Results, sensor: str) -> str:
-    """By how much a support pulls at most, where, and what is not counted."""
+    """By how much a support pulls at most, and where."""
     least = _least(results, sensor)
     place = extreme(-least)
     assert place is not None
-    weight = "" if results.study.body[results.study.body_of(sensor)].own_weight else ", own weight not counted"
     where = "" if unchanged(results, least) else in_words(results, place)
-    return f"{quantity(-float(least[place]), 'N')}{where}{weight}"
+    return f"{quantity(-float(least[place]), 'N')}{where}"
 
 
 def _contact_forces(results: Results) -> Iterator[tuple[str, Array]]:

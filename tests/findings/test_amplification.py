@@ -142,7 +142,7 @@ def test_sensors_beyond_their_limits_and_supports_that_pull_are_told() -> None:
 
 
 def supported(own_weight: bool) -> Study:
-    """A beam on three springs, the left one of which pulls where a load stands beyond the middle, and each is read."""
+    """A beam on three springs, each of which is read and pulls where a load stands beyond the next."""
     reads = {"displacement": fixed(0.5), "moment": fixed(0.5, "bending_moment"), "rate": fixed(0.5, "velocity")}
     reads |= {"quarter": fixed(0.25), "more": fixed(0.25, "bending_moment")}
     reads |= {name: fixed(at, "support_reaction") for name, at in (("middle", 0.4), ("right", 0.8), ("left", 0.0))}
@@ -152,11 +152,13 @@ def supported(own_weight: bool) -> Study:
 
 
 def test_supports_that_pull_are_told_though_others_press_more() -> None:
-    """The largest reaction is of the middle one, and that of all which pulls most was left out."""
+    """The largest reaction is of the right one, and that of all which pulls most was left out."""
     found = studies.run(supported(False))
-    told, least = "\n".join(answers.answer(found)), float(found.left_min.min())
-    assert least < -0.01 and "\nleft:" not in told
-    assert f"Of the other supports left pulls by up to {quantity(-least, 'N')} at speed" in told
+    told = "\n".join(answers.answer(found))
+    pull = {name: quantity(-float(found[f"{name}_min"].min()), "N") for name in ("left", "middle", "right")}
+    assert f"It pulls by up to {pull['right']} at speed 0.4 m/s, own weight not counted. Of the other supports" in told
+    assert f"middle pulls by up to {pull['middle']} at speed 0.2 m/s and left by up to {pull['left']} at speed" in told
+    assert told.count("own weight not counted") == 1 and "\nleft:" not in told and "\nmiddle:" not in told
     heavy = studies.run(supported(True))
     lowest = min(("left", "middle", "right"), key=lambda name: float(heavy[f"{name}_min"].min()))
     assert float(heavy[f"{lowest}_min"].min()) > 0.0
