@@ -29,7 +29,7 @@ from engine.accuracy.results import Result, differences, results_of, tolerances,
 from engine.accuracy.shown import Histories, Shown, fine_enough
 from engine.kernels.layout import STATISTICS
 from engine.march.outcome import NOWHERE, USED, number_of, outcome, used, vibration
-from engine.march.rest import counts_settling
+from engine.march.rest import most_settling
 from engine.model.timeline import MOST_STATIONS
 from results_schema.arrays import Array, Counts, split
 from results_schema.gravest_status import lost
@@ -170,7 +170,7 @@ class MarchGroup(Group):
     @property
     def rows(self) -> int:
         keeps = self.grid.asked.reduction is not None or self.grid.listens
-        return super().rows if keeps else counts_settling(self.tables).size
+        return super().rows if keeps else min(self.steps + 1, most_settling(self.scene.study))
 
     @property
     def work(self) -> float:

@@ -48,6 +48,8 @@ class Ladder:
 
 def ladder_of(asked: Asked, grid: SceneGrid) -> Ladder:
     """The ladder within what the study fixes."""
+    if grid.common is not None:
+        return Ladder(grid.common, (1,) if grid.fixed else CUTS)
     study, says = asked.study, grid.scene.numerics
     names = open_bodies(study)
     rigid = max((part.modal.rigid_modes for part in grid.scene.bodies if part.name in names), default=0)
@@ -61,8 +63,7 @@ def ladder_of(asked: Asked, grid: SceneGrid) -> Ladder:
         for count in (modes[:1] if name == "static" and says.static_correction else modes)
         for scheme in (schemes[:1] if name == "static" else schemes)
     ]
-    own = columns if grid.common is None else [column for column in columns if column in grid.common]
-    return Ladder(tuple(own), (1,) if grid.fixed else CUTS)
+    return Ladder(tuple(columns), (1,) if grid.fixed else CUTS)
 
 
 def share_ladder(asked: Asked, grids: Sequence[SceneGrid]) -> None:

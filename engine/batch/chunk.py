@@ -15,6 +15,7 @@ from engine.accuracy.jobs import Halted, Job, Share
 from engine.accuracy.results import Result, results_of, worst_held
 from engine.accuracy.shown import stations_shown
 from engine.batch.plan import NOBODY, Plan
+from engine.kernels.layout import LANES
 from engine.linear_algebra import one_thread
 from engine.march.outcome import USED, Asked, Flat, Outcome, histories
 from engine.march.rest import WIDER, names_of_times
@@ -26,8 +27,30 @@ from results_schema.gravest_status import gravest, lost
 from results_schema.status import Status
 from results_schema.store.rows import Arrays, Chunk, Rows, joined
 
+LEAST_JOBS, MOST_IN_JOB = 32, 16  # of short chunks: to hand one over takes as long as what it computes
 MOST_OF_TIMES = 1.0  # of a settling time: a larger error says no more than that there is no estimate
 OF_CRASHED = {"status": np.int8(Status.CRASHED), "diverged_step": np.int64(-1)}  # other whole numbers are 0
+
+
+def jobs_of(plan: Plan, done: Counts | None, chunk: int | None, beside: int) -> list[Job[Chunk]]:
+    """The chunks that are left as jobs, of which so many are done ``beside`` each other; ``chunk`` fixes the variants
+    of each. Where many have fewer variants than a block, several are one job."""
+    chunks, bundles = list(plan.chunks(done, chunk)), list[list[tuple[int, Counts]]]()
+    most = int(np.clip(sum(part.size < LANES for _, part in chunks) // LEAST_JOBS, 1, MOST_IN_JOB))
+    for one in chunks:
+        alone = not bundles or len(bundles[-1]) == most or max(one[1].size, bundles[-1][-1][1].size) >= LANES
+        bundles += [[]] if alone else []
+        bundles[-1].append(one)
+    longest = beside * max(map(len, bundles), default=1)
+    return [_job_of(bundle, longest) for bundle in bundles]
+
+
+def _job_of(chunks: Sequence[tuple[int, Counts]], beside: int) -> Job[Chunk]:
+    """Some chunks, each with the number of its group, as one job."""
+    groups, parts = zip(*chunks, strict=True)
+    if len(groups) == 1:
+        return Job(partial(march_chunk, group=groups[0], beside=beside), parts[0])
+    return Job(partial(march_chunks, groups=groups, beside=beside), np.concatenate(parts))
 
 
 def march_chunk(plan: Plan, variants: Counts, halted: Halted, group: int, beside: int) -> Chunk:
@@ -36,6 +59,16 @@ def march_chunk(plan: Plan, variants: Counts, halted: Halted, group: int, beside
     plan.forget_before(group - beside)
     arrays, selected = run_chunk(plan, plan.groups[group], variants, halted)
     return plan.reduce(plan, Chunk(Rows(variants, arrays), selected))
+
+
+def march_chunks(plan: Plan, variants: Counts, halted: Halted, groups: Sequence[int], beside: int) -> Chunk:
+    """Chunks of several groups as one job, each of which is so short that handing it over would take as long;
+    beside: as many groups as may be marched side by side. Raises Halted."""
+    parts = [(group, variants[np.isin(variants, plan.groups[group].variants)]) for group in groups]
+    found = [march_chunk(plan, own, halted, group, beside) for group, own in parts if own.size]
+    rows = joined([one.rows for one in found])
+    assert rows is not None
+    return Chunk(rows, joined([one.selected for one in found if one.selected is not None]))
 
 
 def run_chunk(

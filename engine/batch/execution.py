@@ -15,7 +15,7 @@ import numpy as np
 
 from engine.accuracy.choice import Kept
 from engine.accuracy.grids import SceneGrid
-from engine.accuracy.jobs import Crashed, Halted, Job, Told, untold
+from engine.accuracy.jobs import Crashed, Halted, Told, untold
 from engine.batch.executors import Place, Shared, Threads, Where, check_chunk, check_options, cores, place, run_jobs
 from engine.batch.plan import EVERY_MARCH, NOBODY, Plan, check_memory, make_plan
 from engine.linear_algebra import one_thread
@@ -84,14 +84,12 @@ def execute(
 
     Raises what a chunk or the sink raised, after the chunks in flight have ended; Interrupted when ``stop`` is set.
     """
-    from engine.batch.chunk import crashed_chunks, march_chunk
+    from engine.batch.chunk import crashed_chunks, jobs_of
 
     here = here or Threads(cores())
     warm_up(plan)
     choose(plan, here, stop)
-    tasks = [
-        Job(partial(march_chunk, group=number, beside=here.beside), part) for number, part in plan.chunks(done, chunk)
-    ]
+    tasks = jobs_of(plan, done, chunk, here.beside)
     finished = 0 if done is None else int(done.size)
 
     def take(found: Chunk) -> None:

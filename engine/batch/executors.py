@@ -8,7 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from numbers import Integral
@@ -20,7 +20,7 @@ from engine.accuracy.jobs import Crashed, Halted, Job, Told, untold
 from engine.linear_algebra import one_thread
 from engine.march.stepper import Halted as Gone
 from results_schema.arrays import Counts
-from results_schema.errors import BadInput
+from results_schema.errors import BadInput, WorkersGaveUp
 
 T = TypeVar("T")
 
@@ -90,6 +90,19 @@ def place(threads: int | None = None, workers: int = 0, scheduler: str | None = 
     else:
         with one_thread():
             yield Threads(threads or cores())
+
+
+@contextmanager
+def in_processes(where: Where) -> Iterator[Place]:
+    """The place, as of `Where`; where nobody says, a process for every core, and threads where none can be started."""
+    from engine.batch.processes import on_cores
+
+    with ExitStack() as stack:
+        found: Place | None = None
+        if cores() > 1 and not any(where.values()):
+            with suppress(WorkersGaveUp):
+                found = stack.enter_context(on_cores(cores()))
+        yield found or stack.enter_context(place(**where))
 
 
 def check_place(threads: int | None = None, workers: int = 0, scheduler: str | None = None) -> None:
@@ -192,7 +205,7 @@ class Threads:
         beside.start()
         try:
             for _ in jobs:
-                found = _next(results, halted)
+                found = next_of(results, halted)
                 if isinstance(found, BaseException):
                     raise found
                 sink(found)
@@ -227,13 +240,18 @@ def _do(job: Callable[[], object], results: queue.Queue[Any], given_up: Halted) 
         found: object = job()
     except BaseException as error:
         found = error
-    while not given_up():  # wait for room in the queue, unless the caller has gone
+    put(results, found, given_up)
+
+
+def put(results: queue.Queue[Any], found: object, given_up: Halted) -> None:
+    """Wait for room in a queue, unless the caller has gone."""
+    while not given_up():
         with suppress(queue.Full):
             results.put(found, timeout=0.05)
             return
 
 
-def _next(results: queue.Queue[Any], halted: Halted) -> Any:
+def next_of(results: queue.Queue[Any], halted: Halted) -> Any:
     """What the next job found. Raises Halted."""
     while True:
         if halted():

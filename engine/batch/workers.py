@@ -31,6 +31,7 @@ from distributed.security import Security
 from engine.accuracy.jobs import Halted, Job
 from engine.batch.addresses import is_here
 from engine.batch.handshake import Computer, check_computer, own_computer
+from engine.batch.processes import environment
 from engine.linear_algebra import one_thread
 from engine.march.stepper import Halted as Gone
 from results_schema.arrays import Counts
@@ -56,7 +57,8 @@ def on_this_machine(count: int, threads: int, memory: int | None = None) -> Iter
     """So many processes of this machine with so many threads each, that listen on its loopback alone. memory: bytes
     that each may take, an equal part of the machine's unless given."""
     memory = memory or os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // count
-    logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # what it has to say is said below
+    for talker in ("asyncio", "distributed.batched"):  # what they have to say is said below
+        logging.getLogger(talker).setLevel(logging.CRITICAL)
     with ExitStack() as stack:
         try:
             stack.enter_context(dask.config.set(QUIET))
@@ -88,9 +90,7 @@ class Processes:
 
     def __init__(self, arguments: tuple[str, ...]) -> None:
         self._command = [sys.executable, "-m", "engine.batch.worker_process", *arguments]
-        threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-        known = os.pathsep.join(os.path.abspath(folder) for folder in sys.path)
-        self._environment = os.environ | threads | {"PYTHONPATH": known}
+        self._environment = environment()
         self._running: list[subprocess.Popen[bytes]] = []
 
     def keep(self, count: int) -> None:
@@ -182,7 +182,7 @@ class Workers:
         self.client, self._revive = client, revive
         self.slots, self._looked, self._seen = 0, -np.inf, time.monotonic()
         self._key = ""
-        self._subject: Any = None
+        self._subject: Any = object()  # nobody has sent it, whatever a subject is
         self._check_computers()
 
     @property

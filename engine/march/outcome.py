@@ -14,7 +14,7 @@ from engine.kernels import layout
 from engine.kernels.schemes import Scheme
 from engine.march.envelopes import MOST_KEPT, envelope_names
 from engine.march.march import Marched
-from engine.march.rest import counts_settling, elapsed, residuals, settling_in_other_bands, settling_times
+from engine.march.rest import counts_settling, elapsed, residuals, settling_times
 from engine.march.richardson import march_scheme
 from engine.march.tables import SceneTables
 from engine.model.lane_table import in_whole_blocks, weight, weights
@@ -115,10 +115,11 @@ def outcome(
     _silence(tables, marched)
     history = marched.history[np.searchsorted(counts, stations)]
     reduction = marched.history[np.searchsorted(counts, own), : len(asked.study.sensor)]
+    settling = settling_times(tables, values, counts, marched.history)
     numbers = {
         **_extremes(tables, marched, counts),
         **residuals(tables, values, marched),
-        **settling_times(tables, values, counts, marched.history),
+        **settling.times,
         **_contact_forces(tables, values, marched),
         **_envelopes(tables, lanes, size, halted),
         **_statics(tables, values),
@@ -130,8 +131,8 @@ def outcome(
         if array.dtype == np.float64:
             array[nothing] = np.nan
     kept = _described(tables, values, shown, marched, counts) if shown.size else {}
-    other_bands = settling_in_other_bands(tables, values, counts, marched.history)
-    return Outcome(numbers, history, status, diverged_step, _scale(tables, values, numbers), other_bands, kept)
+    scale = _scale(tables, values, numbers)
+    return Outcome(numbers, history, status, diverged_step, scale, settling.other_bands, kept)
 
 
 USED = ("fidelity_used", "scheme_used", "modes_used", "steps_used")  # what a variant is marched again by

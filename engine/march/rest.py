@@ -60,6 +60,11 @@ def names_of_times(sensor: str) -> tuple[str, str]:
     return f"{sensor}_settling_time", f"{sensor}_move_and_settle_time"
 
 
+def most_settling(study: Study) -> int:
+    """So many of these stations at most."""
+    return MOST_STATIONS if study.output.residual and settling(study) else 0
+
+
 def counts_settling(tables: SceneTables) -> Counts:
     """Stations by their count at which it is looked for when sensors have settled; none where that is not told."""
     if not (settling(tables.model.study) and tables.watches_rest):
@@ -67,27 +72,25 @@ def counts_settling(tables: SceneTables) -> Counts:
     return counts_at_rest(tables.timeline, MOST_STATIONS)
 
 
-def settling_times(tables: SceneTables, values: VariantValues, counts: Counts, history: Array) -> dict[str, Array]:
-    """How long after all carriages have come to rest or left a sensor is off its static value by more than its band,
-    s, and since time 0; NaN where it still is within a period, or two beats, of the end, as it may swing out of it
-    again. history (H, J, V) of the sensors at stations by their count."""
-    found = dict[str, Array]()
+class Settling(NamedTuple):
+    """When sensors have settled. times (V,) by result: how long after all carriages have come to rest or left a sensor
+    is off its static value by more than its band, s, and since time 0; NaN where it still is within a period, or two
+    beats, of the end, as it may swing out of it again. other_bands (V, 2, `WIDER`) by sensor: the former in bands that
+    are wider and narrower than its own by parts of it; what its readings may be off lies between them."""
+
+    times: dict[str, Array]
+    other_bands: dict[str, Array]
+
+
+def settling_times(tables: SceneTables, values: VariantValues, counts: Counts, history: Array) -> Settling:
+    """The same by histories (H, J, V) of the sensors at stations by their count."""
+    found = Settling({}, {})
     for rest in _rests(tables, values, counts, history):
         settling_time, move_and_settle_time = names_of_times(rest.sensor)
-        found[settling_time] = rest.settled_within(1.0)
-        found[move_and_settle_time] = rest.begins + found[settling_time]
-    return found
-
-
-def settling_in_other_bands(
-    tables: SceneTables, values: VariantValues, counts: Counts, history: Array
-) -> dict[str, Array]:
-    """(V, 2, `WIDER`) the settling times of every sensor, in bands that are wider and narrower than its own by parts of
-    it: what its readings may be off lies between them, and by that its settling time may be off."""
-    found = dict[str, Array]()
-    for rest in _rests(tables, values, counts, history):
-        times = [[rest.settled_within(1.0 + sign * part) for part in WIDER] for sign in (1.0, -1.0)]
-        found[rest.sensor] = np.moveaxis(np.array(times), 2, 0)
+        found.times[settling_time] = rest.settled_within(1.0)
+        found.times[move_and_settle_time] = rest.begins + found.times[settling_time]
+        others = [[rest.settled_within(1.0 + sign * part) for part in WIDER] for sign in (1.0, -1.0)]
+        found.other_bands[rest.sensor] = np.moveaxis(np.array(others), 2, 0)
     return found
 
 

@@ -24,6 +24,7 @@ ROUNDS = (16, 64, PILOTS)  # pilots, as long as the next round is expected to en
 CLIMB = 10.0  # times the convergence of a few variants that pilots take on the ladder: 2 to 23
 MARCHED = 0.07  # of that convergence that a scene's march takes by what pilots tell: of swept motions on frames
 BROKEN_OFF = 2.5  # times the seconds after which some pilots were broken off that all of them take: 2 to 3
+START = 6.0  # s until processes have started and loaded kernels: 5 to 7
 AUDIT = 1.7  # times that convergence that an audit takes, one level beyond it: 1.1 to 4.3
 UNFINISHED = 2.0  # times the seconds in which variants did not converge that they take
 AROUND = 1.6  # times loading and planning: gathering and writing take about half as much
@@ -113,7 +114,7 @@ def _without_pilots(plan: Plan, looked: Looked, threads: int, tried: float) -> F
     less = f"there was no time for pilots: a run measures {pilots}, and takes what they show to be enough"
     scenes = scenes_of_pilots(len(plan.grids), plan.size, usual_pilots(plan.size))
     seconds = max(BROKEN_OFF * tried, CLIMB * looked.seconds * scenes / min(threads, scenes))
-    seconds += MARCHED * looked.seconds * len(plan.grids)
+    seconds += MARCHED * looked.seconds * len(plan.grids) / threads + START * plan.many_scenes
     if not looked.parts:
         return Forecast(plan, "", (), seconds, f"{less}; this may take longer")
     title = f"What {counted(len(looked.parts), 'variant')} converged with; a run takes no more than it needs"
@@ -145,7 +146,7 @@ def _choose(plan: Plan, threads: int, looked: Looked, end: float, rounds: Sequen
     )
     longer = more_scenes / scenes * max(1.0, usual * scenes / (pilots * more_scenes)) ** 0.5
     pace, tables = _pace(trial)
-    seconds = took * longer + (trial.seconds * pace + tables * len(trial.groups)) / threads
+    seconds = START * plan.many_scenes + took * longer + (trial.seconds * pace + tables * len(trial.groups)) / threads
     return Forecast(trial, title, chosen.rows(chosen.chosen(trial)), seconds)
 
 

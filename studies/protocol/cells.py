@@ -18,7 +18,8 @@ from results_schema.status import Status, label
 from results_schema.store.rows import Chunk, Rows, joined
 from results_schema.variables import axes
 from studies.protocol.kept_pilots import NAME as PILOTS
-from studies.protocol.parts import Store, Variants
+from studies.protocol.parts import Variants
+from studies.protocol.store import Store
 from studies.protocol.streamed import summarised
 from studies.results.cells import single_numbers
 

@@ -14,7 +14,7 @@ from results_schema.store.tables import Table, from_arrays
 
 if TYPE_CHECKING:
     from engine.accuracy.choice import Found
-    from studies.protocol.parts import Store
+    from studies.protocol.store import Store
 
 NAME = "pilots"  # of the part
 _SCENE, _PILOTS = "scene", "pilots"

@@ -4,11 +4,11 @@ so a killed run goes on from there, and put together at the end.
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import partial
-from typing import IO, TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,18 +19,19 @@ from results_schema.arrays import Counts
 from results_schema.errors import Interrupted, WorkersGaveUp
 from results_schema.lazy_imports import xr
 from results_schema.store.rows import Chunk, Collector, Gatherer, Rows, RowsOnDisk, joined
-from results_schema.store.tables import Table, from_dataset, to_dataset
+from results_schema.store.tables import from_dataset, to_dataset
 from results_schema.variables import declarations
 from studies.protocol.kept_pilots import NAME as PILOTS
 from studies.protocol.kept_pilots import KeptPilots
 from studies.protocol.listener import NOBODY, Listener
 from studies.protocol.stopping import AskedElsewhere, Stop
+from studies.protocol.store import Store
 from studies.protocol.streamed import streamed, summarised, with_coordinates
 from studies.results.formatting import counted
 from studies.results.results import Results
 
 if TYPE_CHECKING:
-    from engine.batch.executors import Place
+    from engine.batch.executors import Place, Where
     from engine.scene.study import Study
     from studies.protocol.study import Kind, PiecedKind
 
@@ -75,52 +76,6 @@ class Work:
         self.stop.check()
 
 
-class Store(Protocol):
-    """Where finished parts are kept: `results_schema.store.parts.PartStore`, or memory."""
-
-    def write(self, name: str, part: Mapping[str, Table]) -> object:
-        """Keep one part."""
-
-    def finished(self) -> dict[str, np.ndarray]:
-        """The variants of every part by name, none in a piece."""
-
-    def read(self, name: str) -> Mapping[str, Table]:
-        """One part."""
-
-    def scratch(self) -> IO[bytes]:
-        """A file without a name, gone when it is closed, for what is too large for memory."""
-
-    def rows(self, variants: int, size: int) -> RowsOnDisk | None:
-        """Where to put the results of so many variants, of at most so many bytes; None: in memory."""
-
-
-class Memory:
-    """Parts of a run that writes no archive."""
-
-    def __init__(self) -> None:
-        self._parts: dict[str, Mapping[str, Table]] = {}
-
-    def write(self, name: str, part: Mapping[str, Table]) -> None:
-        """Keep one part."""
-        self._parts[name] = part
-
-    def finished(self) -> dict[str, np.ndarray]:
-        """Which parts there are."""
-        return dict.fromkeys(self._parts, np.empty(0, np.int64))
-
-    def read(self, name: str) -> Mapping[str, Table]:
-        """One part, which is handed over."""
-        return self._parts.pop(name)
-
-    def scratch(self) -> IO[bytes]:
-        """A file without a name."""
-        return tempfile.TemporaryFile()
-
-    def rows(self, variants: int, size: int) -> RowsOnDisk | None:
-        """In memory, where its dataset is to be."""
-        return None
-
-
 class Parts(Protocol):
     """The work of one study.
 
@@ -136,6 +91,9 @@ class Parts(Protocol):
 
     def check_memory(self) -> None:
         """Raise BadInput where the results are more than memory holds, for whom keeps them there."""
+
+    def place(self, where: Where) -> AbstractContextManager[Place]:
+        """Where they are best computed, but for what somebody says. Raises BadInput and WorkersGaveUp."""
 
     def compute(self, store: Store, work: Work) -> int:
         """Compute what the store does not hold yet; the number of those that it held. Raises Interrupted."""
@@ -172,6 +130,12 @@ class Variants:
         from engine.batch.plan import check_memory
 
         check_memory(self.plan.study, self.plan.size, self.plan.disk_bytes)
+
+    def place(self, where: Where) -> AbstractContextManager[Place]:
+        """Processes where there are many scenes, else threads."""
+        from engine.batch.executors import in_processes, place
+
+        return in_processes(where) if self.plan.many_scenes else place(**where)
 
     def compute(self, store: Store, work: Work) -> int:
         """March what the store does not hold yet."""
@@ -328,6 +292,12 @@ class Pieces:
             return 0 if wanted == "auto" else min(int(wanted), cases.size)
         whole = sum(piece.seconds for piece in self.pieces)
         return enough(cases.size, whole, lambda count: count * self.kind.audit_seconds * whole / cases.size)
+
+    def place(self, where: Where) -> AbstractContextManager[Place]:
+        """Threads."""
+        from engine.batch.executors import place
+
+        return place(**where)
 
     def check_memory(self) -> None:
         """Pieces are small, or refused where they are planned."""

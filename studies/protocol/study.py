@@ -19,7 +19,8 @@ from results_schema.registry import ABSENT, Pieces, lacks, no_row_of
 from results_schema.validate import validate
 from studies.protocol.checksum import VALUES, checksum_of_values
 from studies.protocol.listener import NOBODY, Listener
-from studies.protocol.parts import Foreseen, Memory, TextTable, Variants, Work
+from studies.protocol.parts import Foreseen, TextTable, Variants, Work
+from studies.protocol.store import Memory
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -277,7 +278,7 @@ def run(study: Study | str | Path, **options: Any) -> xr.Dataset:
     options: progress and chunk, and where to run, as of `engine.run`. Meanwhile numpy's linear algebra keeps to one
     thread in the whole process.
     """
-    from engine.batch.executors import Where, check_chunk, check_options, place
+    from engine.batch.executors import Where, check_chunk, check_options
     from engine.scene.study import study_of
 
     started = time.perf_counter()
@@ -288,8 +289,8 @@ def run(study: Study | str | Path, **options: Any) -> xr.Dataset:
     parts.check_memory()
     for remark in parts.remarks:
         warnings.warn(remark, Remark, stacklevel=2)
-    where = {key: options.pop(key) for key in Where.__annotations__ if key in options}
-    with place(**where) as here:
+    where: Any = {key: options.pop(key) for key in Where.__annotations__ if key in options}
+    with parts.place(where) as here:
         progress = options.get("progress")
         listener = NOBODY if progress is None else Listener(progress)
         parts.compute(store, Work(place=here, listener=listener, chunk=options.get("chunk")))

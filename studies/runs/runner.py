@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 
 import xarray as xr
 
-from engine.batch.executors import place
 from engine.kernels.compiling import told_of_compiling
 from engine.model.distinct_models import base_scene
 from engine.scene.study import Study
@@ -97,7 +96,7 @@ def run_to_archive(
         if _look(run) == "same study, finished":  # somebody else has finished it since the run began
             store.remove()
             return _found_finished(run)
-        with place(**options.where) as here, told_of_compiling(listener.stage):
+        with parts.place(options.where) as here, told_of_compiling(listener.stage):
             work = Work(None, stop, listener, place=here)
             resumed = parts.compute(store, work)
             work.check()

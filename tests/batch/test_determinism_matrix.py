@@ -16,7 +16,8 @@ from engine.batch.workers import on_this_machine
 from engine.kernels.schemes import SCHEMES
 from engine.scene.study import Study, load
 from results_schema.store.rows import Collector
-from studies.protocol.parts import Memory, Work
+from studies.protocol.parts import Work
+from studies.protocol.store import Memory
 from studies.protocol.study import kind_of
 from tests.accuracy.chosen import sweep
 from tests.engine.bodies_on_contacts import riding

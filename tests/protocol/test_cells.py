@@ -22,7 +22,8 @@ from results_schema.status import Status
 from results_schema.store import rows
 from results_schema.store.archive import open_archive
 from studies.commands.cli import main as command
-from studies.protocol.parts import Memory, Variants, Work
+from studies.protocol.parts import Variants, Work
+from studies.protocol.store import Memory
 from studies.protocol.study import kind_of
 from studies.reporting.tabulated import table_of
 from studies.results.formatting import quantity

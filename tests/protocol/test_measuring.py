@@ -24,8 +24,9 @@ from results_schema.store.tables import Table, from_dataset, to_dataset
 from studies.commands.cli import main
 from studies.protocol.listener import Listener
 from studies.protocol.options import RunOptions
-from studies.protocol.parts import Memory, Piece, Pieces, Work
+from studies.protocol.parts import Piece, Pieces, Work
 from studies.protocol.stopping import Stop
+from studies.protocol.store import Memory
 from studies.protocol.study import PiecedKind, question_of
 from studies.runs.runner import run_to_archive
 from tests.schema.samples import FailNth
