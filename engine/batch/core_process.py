@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from engine.accuracy.jobs import Halted
-from engine.batch.processes import Raised, send
+from engine.batch.processes import Found, Raised, send
 from engine.linear_algebra import one_thread
 from results_schema.arrays import Counts
 
@@ -37,10 +37,10 @@ def main() -> None:
                 send(found, _done(subject, *given))
 
 
-def _done(subject: Any, function: Callable[[Any, Counts, Halted], T], lanes: Counts) -> T | Raised:
+def _done(subject: Any, function: Callable[[Any, Counts, Halted], T], lanes: Counts) -> Found | Raised:
     """What a job finds, or raises."""
     try:
-        return function(subject, lanes, lambda: False)
+        return Found(function(subject, lanes, lambda: False))
     except BaseException as error:
         return Raised(error)
 

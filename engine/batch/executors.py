@@ -17,14 +17,12 @@ from typing import Any, Protocol, TypedDict, TypeVar
 import numpy as np
 
 from engine.accuracy.jobs import Crashed, Halted, Job, Told, untold
+from engine.batch.queues import WAITING, next_of, put
 from engine.linear_algebra import one_thread
-from engine.march.stepper import Halted as Gone
 from results_schema.arrays import Counts
 from results_schema.errors import BadInput, WorkersGaveUp
 
 T = TypeVar("T")
-
-WAITING = 4  # findings per thread that may wait for the sink
 
 
 class Place(Protocol):
@@ -241,25 +239,6 @@ def _do(job: Callable[[], object], results: queue.Queue[Any], given_up: Halted) 
     except BaseException as error:
         found = error
     put(results, found, given_up)
-
-
-def put(results: queue.Queue[Any], found: object, given_up: Halted) -> None:
-    """Wait for room in a queue, unless the caller has gone."""
-    while not given_up():
-        with suppress(queue.Full):
-            results.put(found, timeout=0.05)
-            return
-
-
-def next_of(results: queue.Queue[Any], halted: Halted) -> Any:
-    """What the next job found. Raises Halted."""
-    while True:
-        if halted():
-            raise Gone
-        try:
-            return results.get(timeout=0.05)
-        except queue.Empty:
-            continue
 
 
 def _drain(results: queue.Queue[Any]) -> None:

@@ -20,8 +20,8 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from engine.accuracy.jobs import Halted, Job
-from engine.batch.executors import WAITING, next_of, put
 from engine.batch.handshake import own_computer
+from engine.batch.queues import WAITING, next_of, put
 from results_schema.arrays import Counts
 from results_schema.errors import WorkersGaveUp
 
@@ -29,10 +29,24 @@ T = TypeVar("T")
 KEPT = "finished work is kept"
 
 
+class Found(NamedTuple):
+    """What a job found in its process."""
+
+    what: Any
+
+    def value(self) -> Any:
+        """It."""
+        return self.what
+
+
 class Raised(NamedTuple):
     """What a job raised in its process."""
 
     error: BaseException
+
+    def value(self) -> Any:
+        """Raise it."""
+        raise self.error
 
 
 @contextmanager
@@ -81,9 +95,7 @@ class Cores:
         missing = len(jobs)
         try:
             while missing:
-                found = next_of(results, halted)
-                if isinstance(found, Raised):
-                    raise found.error
+                found = next_of(results, halted).value()
                 missing -= 1
                 sink(found)
         finally:
