@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from functools import partial, reduce
 from typing import Any
@@ -39,6 +40,7 @@ from studies.results.results import Results
 
 MOST_HISTORIES = 4
 CURVES = (".mass", *DAMPING, ".force")  # by what they tell: a force multiplies all that it does by the same factor
+DOTTED, SAME = re.compile(r"Dotted: .*?\.(?= |$)"), "Dotted: the speeds of the figure before."
 FLAT = 0.1  # a map of ratios that vary less shows nothing
 
 
@@ -74,7 +76,17 @@ def pictures(results: Results) -> list[Figure]:
     found = [*first, *on_the_way, *others]
     if level and found:
         found[0] = replace(found[0], caption=" ".join([found[0].caption, *level]))
-    return [*residual.pictures(results, limits), *found]
+    return [*residual.pictures(results, limits), *_dotted_once(found)]
+
+
+def _dotted_once(figures: list[Figure]) -> list[Figure]:
+    """Figures of which the first alone lists the speeds at its dotted lines, where others have the same."""
+    lists = [found[0] if (found := DOTTED.search(figure.caption)) else "" for figure in figures]
+    again = [bool(text) and text in lists[:place] for place, text in enumerate(lists)]
+    return [
+        replace(figure, caption=figure.caption.replace(text, SAME)) if repeated else figure
+        for figure, text, repeated in zip(figures, lists, again, strict=True)
+    ]
 
 
 def _top(results: Results, sensor: str) -> Index:

@@ -160,6 +160,15 @@ def test_speeds_at_which_axles_push_in_step_are_marked() -> None:
     assert not [one for one in figures(run("")).values() if one.drawing.legends and one.name != "response"]
 
 
+def test_the_speeds_at_dotted_lines_are_listed_once() -> None:
+    """The sentence stood under five figures."""
+    moment = '[sensor.bending]\nbody = "bed"\nat = 2.5\nquantity = "bending_moment"\n'
+    archive = datasets.archive_of(scenes.run("passage", SPEED, extra=f"{TRAIN}\n{moment}"), "tram.nc")
+    captions = [one.caption for one in answers.figures_of(results_of(archive)) if "Dotted" in one.caption]
+    assert len(captions) > 1 and "axles in step with a frequency" in captions[0]
+    assert all("Dotted: the speeds of the figure before." in one and "axles in step" not in one for one in captions[1:])
+
+
 def test_axles_are_marked_as_far_apart_as_the_figure_has_them() -> None:
     """At the spacing that it holds, which is that of the answer, not that of the study file; at none of several."""
     spacing = 'spacing = { of = "train.tram.spacing", values = [2.0, 4.0] }'
