@@ -183,7 +183,7 @@ def _named_by_pint(name: str) -> tuple[Fraction, Mapping[str, int]]:
 
     if name.casefold() in ("ton", "tons"):  # which pint takes for 907 kg
         raise fault("a ton is one of several sizes", expected='"t" (1,000 kg) or "kg"', received=shortened(name))
-    if name.endswith("s") and name[:-1] in _COMMON:  # which pint takes for a plural
+    if name.endswith("s") and name not in _COMMON and name[:-1] in _COMMON:  # which pint takes for a plural
         raise fault("no such unit", expected=KNOWN_UNITS, received=shortened(name), remedy=_meant(name[:-1]))
     try:
         quantity = _registry().Quantity(Fraction(1), name).to_base_units()

@@ -114,7 +114,8 @@ def _without_pilots(plan: Plan, looked: Looked, threads: int, tried: float) -> F
     less = f"there was no time for pilots: a run measures {pilots}, and takes what they show to be enough"
     scenes = scenes_of_pilots(len(plan.grids), plan.size, usual_pilots(plan.size))
     seconds = max(BROKEN_OFF * tried, CLIMB * looked.seconds * scenes / min(threads, scenes))
-    seconds += MARCHED * looked.seconds * len(plan.grids) / threads + START * plan.many_scenes
+    seconds += MARCHED * looked.seconds * len(plan.grids) / (threads if plan.many_scenes else 1)
+    seconds += START * plan.many_scenes
     if not looked.parts:
         return Forecast(plan, "", (), seconds, f"{less}; this may take longer")
     title = f"What {counted(len(looked.parts), 'variant')} converged with; a run takes no more than it needs"

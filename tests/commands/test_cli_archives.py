@@ -17,8 +17,7 @@ from results_schema.store.archive import open_archive
 from studies.commands import catalogue
 from studies.commands.cli import main
 from studies.commands.screens import show_comparison
-from studies.reporting import summary
-from studies.reporting.comparison import compare
+from studies.reporting import comparison, summary
 from studies.results.formatting import quantity
 from studies.results.results import Results
 from studies.runs.archived import results_of
@@ -84,7 +83,7 @@ def test_no_table_breaks_within_a_number_or_before_its_unit(here: Path, capsys: 
         values = (one.smallest.value, *one.percentiles, one.largest.value)
         assert one.is_constant or all(f" {one.value(value)}" in shown for value in values)
         assert one.is_constant or f"{one.name} {one.sensor}".strip() in shown.splitlines()
-    for found in compare(results, results_of(open_archive("other.nc"))).differences:
+    for found in comparison.compared(results, results_of(open_archive("other.nc"))).differences:
         assert all(quantity(value, found.units) in compared for value in (*found.values, *found.extremes))
     blocks = shown[shown.index("\ntrolley_contact_force_min\n") :].split("\n  ")
     lowest = float(results.dataset.trolley_contact_force_min.min())
@@ -187,7 +186,7 @@ def test_compare_tells_what_differs(here: Path, capsys: Captured) -> None:
     assert main(["compare", "small.nc", "other.nc"]) == 2
     assert "received speed, mass in the first, speed in the second" in capsys.readouterr().err
     apart = open_archive("finer.nc").root.midspan_max - open_archive("small.nc").root.midspan_max
-    found = compare(results_of(open_archive("small.nc")), results_of(open_archive("finer.nc")))
+    found = comparison.compared(results_of(open_archive("small.nc")), results_of(open_archive("finer.nc")))
     told = next(one for one in found.differences if one.name == "midspan_max")
     assert abs(told.largest) == pytest.approx(float(abs(apart).max()), rel=1e-12)
     assert [(change.key, change.first, change.second) for change in found.changes] == [("body.beam.modes", 4, 5)]
@@ -198,8 +197,8 @@ def test_compare_tells_other_states_of_the_program(here: Path, capsys: Captured)
     assert main(["run", "small.toml"]) == 0
     made = results_of(open_archive("small.nc"))
     other = Results(made.dataset.assign_attrs(sources="0123456789ab"), made.study, made.models)
-    assert compare(made, made).programs == ()
-    found = compare(other, made)
+    assert comparison.compared(made, made).programs == ()
+    found = comparison.compared(other, made)
     own = f"wanderlast {version('wanderlast')}, sources "
     assert found.programs == (f"{own}0123456789ab", own + sources_hash(sources())[:12]) and found.agree
     show_comparison(found)
@@ -232,12 +231,12 @@ def test_a_number_that_is_missing_in_one_archive_differs(here: Path, capsys: Cap
     gaps = whole.dataset.copy(deep=True)
     gaps["midspan_max"][3, 1] = np.nan
     for pair in ((whole, Results.of(gaps)), (Results.of(gaps), whole)):
-        found = compare(*pair)
+        found = comparison.compared(*pair)
         told = next(one for one in found.differences if one.name == "midspan_max")
         assert np.isnan(told.largest) and told.beyond == 1 and not found.agree
-    less = compare(whole, Results.of(whole.dataset.drop_vars("midspan_min")))
+    less = comparison.compared(whole, Results.of(whole.dataset.drop_vars("midspan_min")))
     assert less.only_in_one == ["midspan_min"] and not less.agree
-    assert compare(whole, whole).agree
+    assert comparison.compared(whole, whole).agree
 
 
 def test_info_prints_the_study_file(here: Path, capsys: Captured) -> None:

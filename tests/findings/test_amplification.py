@@ -141,25 +141,25 @@ def test_sensors_beyond_their_limits_and_supports_that_pull_are_told() -> None:
     assert quarter > 1e-3 and f"Of the other sensors {other} (up to {quantity(size, 'm')}) exceeds its limit." in told
 
 
-def supported(own_weight: bool) -> Study:
-    """A beam on three springs, each of which is read and pulls where a load stands beyond the next."""
+def supported(middle: float, right: float, own_weight: bool) -> Study:
+    """A beam on three springs, the first at its end, each of which is read."""
     reads = {"displacement": fixed(0.5), "moment": fixed(0.5, "bending_moment"), "rate": fixed(0.5, "velocity")}
     reads |= {"quarter": fixed(0.25), "more": fixed(0.25, "bending_moment")}
-    reads |= {name: fixed(at, "support_reaction") for name, at in (("middle", 0.4), ("right", 0.8), ("left", 0.0))}
-    bed = beam(supports=[{"at": at, "stiffness": 1e4} for at in (0.0, 0.4, 0.8)], own_weight=own_weight)
+    reads |= {name: fixed(at, "support_reaction") for name, at in (("middle", middle), ("right", right), ("left", 0.0))}
+    bed = beam(supports=[{"at": at, "stiffness": 1e4} for at in (0.0, middle, right)], own_weight=own_weight)
     speeds = {"speed": {"of": "carriage.car.motion.speed", "values": [0.2, 0.4]}}
     return built(bed, force(0.5, cruise(0.0, 1.0, 0.1)), sensor=reads, sweep=speeds)
 
 
 def test_supports_that_pull_are_told_though_others_press_more() -> None:
     """The largest reaction is of the right one, and that of all which pulls most was left out."""
-    found = studies.run(supported(False))
+    found = studies.run(supported(0.4, 0.8, own_weight=False))
     told = "\n".join(answers.answer(found))
     pull = {name: quantity(-float(found[f"{name}_min"].min()), "N") for name in ("left", "middle", "right")}
     assert f"It pulls by up to {pull['right']} at speed 0.4 m/s, own weight not counted. Of the other supports" in told
     assert f"middle pulls by up to {pull['middle']} at speed 0.2 m/s and left by up to {pull['left']} at speed" in told
     assert told.count("own weight not counted") == 1 and "\nleft:" not in told and "\nmiddle:" not in told
-    heavy = studies.run(supported(True))
+    heavy = studies.run(supported(0.5, 1.0, own_weight=True))
     lowest = min(("left", "middle", "right"), key=lambda name: float(heavy[f"{name}_min"].min()))
     assert float(heavy[f"{lowest}_min"].min()) > 0.0
     told = "\n".join(answers.answer(heavy))
