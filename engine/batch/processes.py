@@ -128,11 +128,10 @@ class Cores:
         """One of the processes, started anew where it has ended. Raises WorkersGaveUp."""
         if number not in self._running:
             command, pipe = [sys.executable, "-m", "engine.batch.core_process"], subprocess.PIPE
-            try:
-                self._running[number] = subprocess.Popen(
-                    command, env=environment(), stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL
-                )
-            except OSError as error:
+            ways: dict[str, Any] = {"stdin": pipe, "stdout": pipe, "stderr": subprocess.DEVNULL}
+            try:  # in a session of its own: Ctrl-C goes to all processes of a terminal, and is this one's to hear
+                self._running[number] = subprocess.Popen(command, env=environment(), start_new_session=True, **ways)
+            except (OSError, TypeError) as error:  # TypeError: a Python inside another program has no executable
                 what = f"processes cannot be started ({error})"
                 raise WorkersGaveUp(what, where="processes", remedy="run with --threads 1") from error
         return self._running[number]
