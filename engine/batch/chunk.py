@@ -27,7 +27,9 @@ from results_schema.gravest_status import gravest, lost
 from results_schema.status import Status
 from results_schema.store.rows import Arrays, Chunk, Rows, joined
 
-LEAST_JOBS, MOST_IN_JOB = 32, 16  # of short chunks: to hand one over takes as long as what it computes
+#: Jobs of short chunks, at least, and chunks of one: handed over one by one to two processes 600 scenes took 20.8 s in
+#: place of 11.4, as that takes as long as what each computes.
+LEAST_JOBS, MOST_IN_JOB = 32, 16
 MOST_OF_TIMES = 1.0  # of a settling time: a larger error says no more than that there is no estimate
 OF_CRASHED = {"status": np.int8(Status.CRASHED), "diverged_step": np.int64(-1)}  # other whole numbers are 0
 
@@ -122,12 +124,10 @@ def _told_of_times(outcome: Outcome, asked: Asked, error: Mapping[str, Array]) -
         change = _within_bands(outcome, name, off / HISTORY_PART / sensor.settling_band, outcome.numbers[settling_time])
         for result in own:
             took = outcome.numbers[result]
-            part = np.divide(change, took, out=np.where(change > 0.0, np.inf, 0.0), where=took > 0.0)
+            part = np.divide(change, took, out=np.where(change == 0.0, 0.0, np.inf), where=took > 0.0)
             part[residual + off < sensor.settling_band] = 0.0
-            unknown = np.isnan(took) | ~(part <= MOST_OF_TIMES)
-            error[result][:] = np.where(
-                unknown, np.nan, part
-            )  # also where it stays within, of a rest too short to tell
+            # No estimate either of what stays within, of a rest that is too short to tell.
+            error[result][:] = np.where((part <= MOST_OF_TIMES) & ~np.isnan(took), part, np.nan)
 
 
 def _within_bands(outcome: Outcome, sensor: str, parts: Array, took: Array) -> Array:

@@ -18,7 +18,6 @@ STARTS = Path(__file__).parents[1] / "study_templates"
 MEASURED = LIBRARY / "measured.json"  # what `python -m tests.gallery` found of every built-in study
 COMMAND = "#     wanderlast "  # how a line with an example command begins
 EVERY_STUDY = STARTS / "every-study.part"
-TABLES = (".csv", ".parquet")  # endings of what `export` writes
 
 
 @dataclass(frozen=True)
@@ -88,7 +87,9 @@ def refuse_study(path: Path) -> None:
 
 def refuse_table(archive: Path | None) -> None:
     """Refuse the name of a table as that of an archive. Raises BadInput."""
-    if archive is not None and archive.suffix in TABLES:
+    from studies.reporting.tabulated import WRITERS
+
+    if archive is not None and archive.suffix in WRITERS:
         own = archive.with_suffix(".nc")
         remedy = f"-o {own}, then wanderlast export {own} {archive}"
         raise BadInput("run writes archives, and this is the name of a table", where=str(archive), remedy=remedy)

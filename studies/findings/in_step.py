@@ -51,10 +51,11 @@ class InStep(NamedTuple):
 def speeds_in_step(
     study: Study, name: str, body: xr.Dataset, between: tuple[float, float], readers: Iterable[Sensor | Envelope]
 ) -> list[InStep]:
-    """Where much of a train's load pushes in step with one of the first frequencies of its body, the highest speed
-    first: at most eight, at which that mode swings most. body: as its archive tells it. readers: where some read
-    accelerations of that body these count, of modes up to their frequency limits, else displacements. None of a train
-    that starts and stops, whose axles never come in one rhythm for long, or of two axles."""
+    """Where much of a train's load pushes in step with one of the first frequencies of its body, as it is crossed, the
+    highest speed first: at most eight of those at which a mode swings more than a little slower and faster. body: as
+    its archive tells it. readers: where some read accelerations of that body these count, of modes up to their
+    frequency limits, else displacements. None of a train that starts and stops, whose axles never come in one rhythm
+    for long, or of two axles."""
     train, found, speeds = study.train[name], list[InStep](), np.geomspace(*between, LOOKED_AT)
     if not train.motion.passes or train.count < FEWEST:
         return []

@@ -59,6 +59,15 @@ def test_axles_at_equal_distances_push_in_step_where_they_come_once_in_some_peri
     assert [one.part for one in speeds] == pytest.approx(parts.tolist(), abs=1e-9) and parts.min() > 0.99
 
 
+def test_the_spectrum_of_axles_at_equal_distances_is_largest_where_they_come_once_in_some_periods() -> None:
+    """At f d/k, by all of their load; five of them have no other maxima above 0.3 but near 0.25."""
+    speeds = np.geomspace(1.4, 7.0, 4096)
+    share = with_frequencies(2.0)[0].train["tram"].in_step(speeds / 2.0)
+    at = 1 + np.flatnonzero((share[1:-1] > share[:-2]) & (share[1:-1] >= share[2:]) & (share[1:-1] >= 0.3))
+    assert speeds[at][::-1].tolist() == pytest.approx([6.0, 3.0, 2.0, 1.5], rel=1e-3)
+    assert share[at].tolist() == pytest.approx([1.0] * 4, abs=1e-3)
+
+
 def test_two_axles_are_no_train() -> None:
     """Two pushes leave no resonance."""
     assert found(hauled(beam(), axles=3, spacing=0.3), 0.2, 1.0)

@@ -297,6 +297,8 @@ def test_check_tells_speeds_at_which_axles_push_in_step() -> None:
     (table,) = [table for table in tables if "in step" in table.title]
     assert table.headings == ("speed", "frequency", "way in a period", "part of its load", "swing of its mode")
     first = np.pi / 2.0 * np.sqrt(210e9 * 8.33e-6 / (7850.0 * 0.01)) / 15.0**2
+    parts = whole.train["tram"].in_step(np.array([8.0, 4.0, 8.0 / 3.0]))
+    assert parts.tolist() == pytest.approx([1.0 / 3.0, 1.0, 1.0 / 3.0])
     ways = np.geomspace(7.0 / 3.6 / first, 12.0, 200_000)
     k = 2.0 * np.pi / ways
     share = np.abs(1.0 + 2.0 * np.cos(4.0 * k)) / 3.0
