@@ -13,18 +13,23 @@ FIXED = ("schema_version", "expected", "sweep", "output", "question", "solver.au
 
 
 def value_in(scene: Spec, path: str) -> Any:
-    """The value at a dotted key of a scene. KeyError where there is none."""
+    """The value at a dotted key of a scene. KeyError, which names the keys there are, where there is none."""
     found: Any = scene
     for key in path.split("."):
-        try:
-            if isinstance(found, Spec):
-                known = (*type(found).model_fields, *type(found).derived)
-                found = {name: getattr(found, name) for name in known}[key]
-            else:
-                found = found[int(key) if isinstance(found, tuple) else key]
-        except (KeyError, IndexError, ValueError, TypeError):
-            raise KeyError(path) from None
+        inside = _inside(found)
+        if key not in inside:
+            raise KeyError(f"{path}: no {key} there, but {', '.join(inside) or 'a number, word or nothing'}")
+        found = inside[key]
     return found
+
+
+def _inside(value: Any) -> dict[str, Any]:
+    """What stands below a value, by key; nothing below numbers and words."""
+    if isinstance(value, Spec):
+        return {name: getattr(value, name) for name in (*type(value).model_fields, *type(value).derived)}
+    if isinstance(value, tuple):
+        return {str(index): item for index, item in enumerate(value)}
+    return value if isinstance(value, dict) else {}
 
 
 def with_value(data: dict[str, Any], path: str, value: Any) -> dict[str, Any]:

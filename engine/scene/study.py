@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -193,7 +193,7 @@ class Study(Scene):
             yield f"body.{body}.{key}", at, coefficient
 
     def value(self, path: str) -> Any:
-        """The value at a dotted key, SI, defaults included. KeyError where there is none.
+        """The value at a dotted key, SI, defaults included. KeyError, which names those there are, where there is none.
 
         >>> Study(kind="passage").value("gravity")
         9.80665
@@ -252,12 +252,12 @@ class Study(Scene):
                 raise self._source.fault(f"sweep.{name}", what, remedy="choose another name for the axis")
         return found
 
-    def with_values(self, values: Mapping[str, Any]) -> Study:
+    def with_values(self, values: Mapping[str, Any] | Iterable[tuple[str, Any]]) -> Study:
         """The study with other values at dotted keys, validated as a whole; its text is the new study as TOML.
 
         Raises BadInput, also for a key that an axis of the sweep sets, unless that axis is given anew.
         """
-        data = self._data
+        data, values = self._data, dict(values)
         for name, axis in self.sweep.axes.items():
             if (lost := next((path for path in axis.of if path in values), None)) and not _is_of_sweep(name, values):
                 raise self._source.fault(

@@ -83,7 +83,8 @@ def compared(first: Results, second: Results) -> Comparison:
         what = "the archives have different axes, so there is nothing to compare"
         axes = [", ".join(one.dims) or "none" for one in (first, second)]
         received = f"{axes[0]} in the first, {axes[1]} in the second"
-        raise BadInput(what, where="compare", expected="the same axes in both", received=received)
+        remedy = "run both over the same axes; their values may differ: those that both have are compared"
+        raise BadInput(what, where="compare", expected="the same axes in both", received=received, remedy=remedy)
     mine, other = xr.align(first.dataset, second.dataset, join="inner", copy=False, exclude=_not_swept(first, second))
     both, own = Results(mine, first.study, first.models), Results(other, second.study, second.models)
     found, missing = _shared(both, own)

@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 
 import studies
+from results_schema.errors import BadInput
 from results_schema.status import Status
 from studies.findings.absolute_errors import absolute_errors
 from studies.reporting import answers
@@ -181,3 +182,11 @@ def test_of_a_value_that_is_the_same_everywhere_the_largest_error_is_told() -> N
     (top,) = (one for one in in_tables(Results.of(found)) if one.name == "midspan_max")
     assert top.is_constant and top.is_loose and error[0] < 0.1 < error.max()
     assert top.extreme.error == pytest.approx(error.max() * float(found.midspan_max[0]), rel=1e-6)
+
+
+def test_studies_of_other_axes_have_nothing_to_compare() -> None:
+    down, steps = {"down": {"node": "b", "direction": "z"}}, {"steps": 100}
+    one = studies.run(study(down, solver=steps))
+    other = studies.run(study(down, solver=steps, sweep={"m": {"of": MASS_KEY, "values": [200, 400]}}))
+    with pytest.raises(BadInput, match=r"(?s)none in the first, m in the second.*run both over the same axes"):
+        studies.compare(one, other)

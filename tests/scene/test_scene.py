@@ -28,6 +28,9 @@ def test_values_and_defaults() -> None:
     assert study.value("carriage.table.motion.cycles") == 3
     assert study.body["bed"].springs[0].damping == 3.0
     assert study.carriage["load"].start_time == pytest.approx(2.0 / (20 / 3.6))
+    for path, known in (("body.bed.lenght", "length"), ("carriage.table.motion.x", "cycles"), ("gravity.x", "number")):
+        with pytest.raises(KeyError, match=f"{path}: no .* there, but .*{known}"):
+            study.value(path)
     assert study.carriage["table"].start_time == 0.5
     assert study.carriage["table"].weight(study.gravity) == pytest.approx(981.0)
     assert [c.inertial for c in study.carriage.values()] == [True, False, False, True]
@@ -78,6 +81,7 @@ def test_with_values() -> None:
     other = study.with_values({"carriage.table.mass": "1 t", "solver.steps": 100, "gravity": 1})
     assert (other.value("carriage.table.mass"), other.solver.steps, other.gravity) == (1000.0, 100, 1.0)
     assert study.value("carriage.table.mass") == 100.0
+    assert study.with_values([("gravity", 1.0)]).gravity == 1.0  # as dict() takes them
     assert load(other.source.text).model_dump() == other.model_dump()
     with pytest.raises(BadInput, match=r"carriage\.table\.mas.*unknown key.*mass"):
         study.with_values({"carriage.table.mas": 1.0})
