@@ -185,7 +185,7 @@ def test_of_a_value_that_is_the_same_everywhere_the_largest_error_is_told() -> N
 
 
 def test_studies_of_other_axes_have_nothing_to_compare() -> None:
-    down, steps = {"down": {"node": "b", "direction": "z"}}, {"steps": 100}
+    down, steps = {"down": {"node": "b", "direction": "z"}}, {"steps": 400}
     one = studies.run(study(down, solver=steps))
     other = studies.run(study(down, solver=steps, sweep={"m": {"of": MASS_KEY, "values": [200, 400]}}))
     with pytest.raises(BadInput, match=r"(?s)none in the first, m in the second.*run both over the same axes"):
