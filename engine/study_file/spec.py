@@ -105,7 +105,7 @@ class KindOf:
         if "kind" not in value:
             problem = fault("the kind is missing", expected=f"one of {known}")
         else:
-            remedy = nearest(kind, list(self.table)) or _OTHER_KINDS.get(str(kind), "")
+            remedy = nearest(kind, list(self.table)) or _OTHER_KINDS.get(str(kind).replace("_", "-"), "")
             what = f"unknown {self.noun} kind"
             problem = fault(what, expected=f"one of {known}", received=shortened(kind), remedy=remedy)
         detail = InitErrorDetails(type=problem, loc=("kind",), input=kind)
@@ -164,10 +164,12 @@ def ascending(values: tuple[Any, ...]) -> tuple[Any, ...]:
 
 
 ROPE = 'a hanging mass that goes up and down is kind = "oscillator"; one that swings on a rope is not built'
+SPRUNG = 'a mass on a spring over its wheel is kind = "oscillator"; one with several axles is kind = "body"'
 # kinds that others look for -> what there is of them
 _OTHER_KINDS = {
     "pendulum": ROPE,
     "train": "a train is a table of its own: [train.NAME] (docs/study-file.md)",
+    **dict.fromkeys(("sprung", "sprung-mass", "spring-mass", "quarter-car", "vehicle", "car", "bogie"), SPRUNG),
 }
 
 # what others call a number -> its key; of several the first that is there
@@ -175,7 +177,8 @@ _SYNONYMS: dict[str, tuple[str, ...]] = {
     other: tuple(keys.split())
     for keys, others in (
         ("force mass", "axle_load axle_weight load weight P F"),
-        ("mass", "m"),
+        ("mass", "m sprung_mass body_mass"),
+        ("wheel_mass", "unsprung_mass unsprung axle_mass"),
         ("youngs_modulus", "E elastic_modulus young_modulus young youngs modulus"),
         ("second_moment", "I Iy Iyy Iz inertia moment_of_inertia second_moment_of_area"),
         ("density", "rho"),
@@ -183,7 +186,7 @@ _SYNONYMS: dict[str, tuple[str, ...]] = {
         ("length", "L span"),
         ("damping_ratio", "damping zeta xi"),
         ("damping", "c"),
-        ("stiffness", "k"),
+        ("stiffness", "k spring_stiffness"),
         ("speed", "v V velocity max_speed vmax"),
         ("acceleration", "accel acc a deceleration decel amax"),
         ("gravity", "g"),

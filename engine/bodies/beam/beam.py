@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from itertools import product
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import AfterValidator, Field, Tag
@@ -34,6 +35,10 @@ END_WORDS = ("pinned", "clamped", "free")
 
 class Spring(Spec):
     """Springs and a damper to ground at a place of the beam (m): N/m, N m/rad, N s/m, not all zero."""
+
+    looked_for: ClassVar[Mapping[str, str]] = dict.fromkeys(
+        ("kind", "type", "support"), 'this list holds springs; stiff ends are words: supports = "pinned-pinned"'
+    )
 
     at: Length = Field(ge=0)
     stiffness: Stiffness = Field(default=0.0, ge=0)
