@@ -6,7 +6,7 @@ these tell of it. Distances count every axis by how fast the errors of pilots ch
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple, Protocol
@@ -123,11 +123,12 @@ class Cheapest(NamedTuple):
 
 
 class Pilots(NamedTuple):
-    """Pilots of a sweep (by flat numbers) and their scenes, which many variants share. span: of their tolerances."""
+    """Pilots of a sweep (by flat numbers) and their scenes by number, which many variants share. span: of their
+    tolerances."""
 
     asked: Asked
     cases: Cases
-    grids: Sequence[SceneGrid]
+    grids: Mapping[int, SceneGrid]
     span: tuple[float, float]
 
     def measured(self, pilots: Counts, share: Share, scene: int) -> tuple[int, Counts, Measured]:
@@ -174,7 +175,8 @@ def find(pilots: Pilots, members: Sequence[Counts], drawn: Counts, share: Share,
     """What some ``drawn`` pilots of a sweep, whose scenes' variants are ``members``, find; told: of how many scenes are
     done. Raises Halted, and Crashed by flat numbers of pilots."""
     parts = [drawn[np.isin(drawn, part)] for part in members]
-    found = sorted(over_scenes(share, pilots, Pilots.measured, parts, told), key=lambda one: (one[0], one[1][0]))
+    own = pilots._replace(grids={scene: grid for scene, grid in pilots.grids.items() if parts[scene].size})
+    found = sorted(over_scenes(share, own, Pilots.measured, parts, told), key=lambda one: (one[0], one[1][0]))
     order = np.concatenate([own for _, own, _ in found])
     return Found(found[0][0], order, _joined([measured for *_, measured in found]))
 

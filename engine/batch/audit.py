@@ -40,7 +40,7 @@ from results_schema.gravest_status import lost
 SEED = 7717  # of the variants that are drawn; pilots have another
 PART, FEWEST, MOST = 0.01, 16, 256  # of all variants, where their number is left open: 256 show a miss in a hundred
 MOST_TIME, FREE_SECONDS = 0.3, 2.0  # of the run's expected time; and what may be spent whatever that is
-AT_ONCE = 2**18  # variants whose work is estimated
+AT_ONCE, LOOKED_AT = 2**18, 64  # variants whose work is estimated at once; scenes, of many
 TABLES = 30  # variants at PACE that take as long as the tables of a march: 29 to 49 with 32 and 16 modes
 #: Modes x steps at PACE of the tables of all levels, and the work of an audit over that of the references of pilots:
 #: ten audits of 64 took 0.3 to 1.7 times as long as by these two.
@@ -88,7 +88,7 @@ def drawn(size: int, count: int, but: Counts | tuple[()] = ()) -> Counts:
 def audit_size(plan: Plan) -> int:
     """How many variants are audited where the study leaves that open."""
     if plan.choice is None:
-        return enough(plan.size, plan.seconds, partial(_seconds, plan))
+        return enough(plan.size, plan.seconds, partial(_seconds, plan, _works_of_some(plan)))
     # What pilots and their references took, in the mean, is known.
     measured, units = plan.choice.measured, float(np.mean([passages(grid) for grid in plan.grids]))
     pilots = usual_pilots(plan.size) * measured.work / plan.choice.pilots.size
@@ -111,15 +111,21 @@ def _dear(plan: Plan) -> float:
     return math.inf if plan.converges else DEAR
 
 
-def _seconds(plan: Plan, count: int) -> float:
+def _works_of_some(plan: Plan) -> list[tuple[Array, Counts]]:
+    """What `_works` finds of some scenes, each for as many as there are, with what a tie more takes."""
+    some = plan.grids[:: -(-len(plan.grids) // LOOKED_AT)]
+    found = [(grid.scene.ties**1.2, *_works(grid, _dear(plan))) for grid in some]
+    return [(len(plan.grids) / len(some) * ties * work, number) for ties, work, number in found]
+
+
+def _seconds(plan: Plan, works: Sequence[tuple[Array, Counts]], count: int) -> float:
     """Expected time of an audit on one thread."""
     share, found = min(1.0, count / plan.size), 0.0
-    for grid in plan.grids:
+    for work, number in works:
         # each march has its tables, and whole blocks
-        work, number = _works(grid, _dear(plan))
         own = share * number
         lanes = np.maximum(own, LANES * np.minimum(1.0, own)) + TABLES * np.minimum(1.0, own)
-        found += float(work @ lanes) * grid.scene.ties**1.2 / PACE
+        found += float(work @ lanes) / PACE
     return found
 
 

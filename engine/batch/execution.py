@@ -16,7 +16,7 @@ import numpy as np
 from engine.accuracy.choice import Kept
 from engine.accuracy.grids import SceneGrid
 from engine.accuracy.jobs import Crashed, Halted, Told, untold
-from engine.batch.executors import Place, Shared, Threads, Where, check_chunk, check_options, cores, place, run_jobs
+from engine.batch.executors import Place, Shared, Threads, Where, check_chunk, check_options, place, run_jobs
 from engine.batch.plan import EVERY_MARCH, NOBODY, Plan, check_memory, make_plan
 from engine.linear_algebra import one_thread
 from engine.march.march import March, prepare
@@ -27,6 +27,7 @@ from engine.model.lane_table import in_whole_blocks, padded
 from engine.observation.cycle_reduction import Reduction
 from engine.scene.study import Study, study_of
 from results_schema.arrays import Counts
+from results_schema.cores import cores
 from results_schema.errors import Interrupted, Remark
 from results_schema.lazy_imports import xr
 from results_schema.store.rows import Chunk, Collector

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import queue
 import threading
 import time
@@ -20,6 +19,7 @@ from engine.accuracy.jobs import Crashed, Halted, Job, Told, untold
 from engine.batch.queues import WAITING, next_of, put
 from engine.linear_algebra import one_thread
 from results_schema.arrays import Counts
+from results_schema.cores import cores
 from results_schema.errors import BadInput, WorkersGaveUp
 
 T = TypeVar("T")
@@ -137,11 +137,6 @@ def check_chunk(chunk: object) -> None:
     """Refuse a number of variants that is none. Raises BadInput."""
     if chunk is not None and (isinstance(chunk, bool) or not isinstance(chunk, int) or chunk < 1):
         raise BadInput("this is no number of variants", where="chunk", expected="1 or more", received=str(chunk))
-
-
-def cores() -> int:
-    """Threads where nobody says how many."""
-    return os.cpu_count() or 1
 
 
 @dataclass(frozen=True)

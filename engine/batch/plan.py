@@ -37,6 +37,7 @@ from engine.scene.sweep import Cases, expand
 from engine.scene.variants import VariantValues, cases_tolerance, sweeps_numerics
 from results_schema.arrays import Array, Counts, split
 from results_schema.blocks import IN_MEMORY
+from results_schema.cores import cores
 from results_schema.errors import BadInput, WorkersGaveUp
 from results_schema.status import Fidelity
 from results_schema.store.rows import Chunk
@@ -52,6 +53,7 @@ MOST_MEMORY = 16 * 2**30
 CHUNK_BYTES = 24 * 2**20  # of one chunk's histories, of which a reduction makes a few copies
 EVERY_MARCH = "march"  # the kind of results that every march has
 NUMBERS_REDUCED = 4  # of 8 bytes, of a variant where extremes alone are kept: its number, its status, what it took
+PROGRAM_BYTES, PROCESS_BYTES = 400 * 2**20, 200 * 2**20  # the program with its kernels, and a process beside it
 PLANNED_BYTES = 150  # of a variant, at most, while it is planned: measured with three swept numbers and 1e7 variants
 LARGEST = 2  # times the tables of most references
 READ_BYTES = 40  # of a variant, at most, while an answer is made of some arrays over all variants
@@ -62,6 +64,10 @@ NAMED = 16  # most of those beside, which the answer names
 #: few variants each has: a scene's ladder takes two to four times as long as its variants' convergence, a march by what
 #: pilots tell a tenth of that.
 FEW, FEW_IN_SCENE, FEW_SCENES = 256, 16, 128
+#: Scenes, of variants that converge and of pilots, that threads do as soon as processes, which take 1 to 5 s to start:
+#: most of their work is Python, in which threads wait for each other. On two cores threads and processes took 2.8 and
+#: 2.9 s for 20 scenes that converge, 9.2 and 6.7 for 100; with pilots 2.9 and 2.7 s for two, 6.9 and 4.4 for eight.
+FEW_CONVERGING, FEW_CLIMBING = 24, 3
 NOBODY: Counts = np.zeros(0, dtype=np.int64)
 
 
@@ -112,9 +118,8 @@ class Plan:
 
     @property
     def many_scenes(self) -> bool:
-        """Whether pilots choose for many scenes, whose tables take longer than their marches: of 600 two threads took
-        1.2 times as long as one, as they wait for each other, two processes 0.7 times."""
-        return len(self.grids) > FEW_SCENES and not self.converges
+        """Whether there are so many scenes that processes of this machine do them sooner than threads."""
+        return len(self.grids) > (FEW_CONVERGING if self.converges else FEW_CLIMBING)
 
     @property
     def groups(self) -> tuple[Group, ...]:
@@ -141,7 +146,7 @@ class Plan:
         ``kept``: where what pilots found is kept, if anywhere; told: of how many of their scenes are done. Raises
         Halted, Crashed by flat numbers of pilots, and WorkersGaveUp where all of them crashed."""
         if not self.converges and self.choice is None:
-            of = Pilots(self.asked, self.cases, self.grids, tolerance_span(self.asked, self.cases))
+            of = Pilots(self.asked, self.cases, dict(enumerate(self.grids)), tolerance_span(self.asked, self.cases))
             drawn = np.setdiff1d(pilots_of(self.cases, self.members, pilots), without)
             if not drawn.size:
                 what = "every variant that was tried ends the process that computes it"
@@ -205,7 +210,8 @@ class Plan:
     @property
     def memory_bytes(self) -> int:
         """Expected peak of a run to an archive."""
-        return needed_memory(self.study, self.size, self.gathered_bytes) + self._tables_bytes
+        processes = self.many_scenes * cores() * PROCESS_BYTES
+        return needed_memory(self.study, self.size, self.gathered_bytes) + self._tables_bytes + processes
 
     @property
     def _tables_bytes(self) -> int:
@@ -359,7 +365,7 @@ def needed_memory(study: Study, size: int, gathered: int) -> int:
     """Expected peak in bytes: the plan, results that are gathered in memory and those that an answer reads, a chunk per
     thread, and the program itself."""
     results = 3 * gathered + READ_BYTES * size if study.output.keeps_variants else 0
-    return 300 * 2**20 + PLANNED_BYTES * size + results + 6 * CHUNK_BYTES
+    return PROGRAM_BYTES + PLANNED_BYTES * size + results + 6 * CHUNK_BYTES
 
 
 def check_memory(study: Study, size: int, gathered: int) -> None:

@@ -78,6 +78,8 @@ class Rider:
         middle = 0.5 * (start + end)
         if not self.stays and not self.delay <= middle <= self.end:
             return False
+        if not self.leaves:
+            return True
         place = float(self.path(np.array([middle]), start, end).S[0])
         return -self._slack <= place <= self.length + self._slack
 
@@ -87,7 +89,7 @@ class Rider:
         low, high = self.motion.range()
         return low + self.offset, high + self.offset
 
-    @property
+    @cached_property
     def leaves(self) -> bool:
         """Whether it passes an end of the body."""
         return self.range[0] < -self._slack or self.range[1] > self.length + self._slack

@@ -1,6 +1,5 @@
 """Throughput of the march that `run` uses, on a fixed scene, so that machines and versions can be compared."""
 
-import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -12,6 +11,7 @@ from engine.batch.plan import make_plan
 from engine.march.step_rules import allow_any_steps
 from engine.scene.settings import ALL_SCHEMES
 from engine.scene.study import Study
+from results_schema.cores import cores
 from results_schema.errors import BadInput
 
 BEST_OF = 7
@@ -130,7 +130,7 @@ def measure(scene: Scene, threads: int | None = None, best_of: int = BEST_OF) ->
     """March the scene several times and take the best; threads: None takes all cores."""
     plan = make_plan(scene.study(), check_steps=allow_any_steps)
     warm_up(plan)
-    threads = threads or os.cpu_count() or 1
+    threads = threads or cores()
     repeats = min(max(1, round(TIMED_SECONDS * threads / plan.seconds)), MOST_REPEATS)
     seconds = min(march_seconds(plan, threads, repeats) for _ in range(best_of))
     rate = scene.variants / seconds

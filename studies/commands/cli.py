@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import os
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -67,6 +66,7 @@ def check(study: str) -> None:
     """Validate STUDY and explain what a run would do."""
     import engine
     from engine.kernels.compiling import told_of_compiling
+    from results_schema.cores import cores
     from studies.commands import catalogue, console, screens
     from studies.commands.preview import preview
     from studies.protocol.study import kind_of
@@ -74,7 +74,7 @@ def check(study: str) -> None:
     path = catalogue.find_study(study)
     loaded = engine.load(path)
     with told_of_compiling(partial(console.say_compiling, path.stem)):
-        seen = preview(kind_of(loaded).parts(loaded), len(os.sched_getaffinity(0)))
+        seen = preview(kind_of(loaded).parts(loaded), cores())
     screens.show_preview(seen)
 
 

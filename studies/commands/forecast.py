@@ -2,17 +2,21 @@
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
 from engine.accuracy.choice import PILOTS, pilots_of, scenes_of_pilots, usual_pilots
 from engine.accuracy.groups import ConvergingGroup, Group
+from engine.accuracy.jobs import Job
 from engine.batch.execution import warm_up
-from engine.batch.executors import Shared, Threads
-from engine.batch.plan import Plan
+from engine.batch.executors import Place, Shared, in_processes, place
+from engine.batch.plan import NOBODY, Plan
 from engine.linear_algebra import one_thread
 from engine.march.stepper import Halted
+from results_schema.arrays import Counts
+from results_schema.cores import cores
 from studies.commands import planned_numerics as chosen
 from studies.results.formatting import counted
 from studies.results.places import spread
@@ -20,11 +24,11 @@ from studies.results.places import spread
 SECONDS = 3.0  # that measuring may take
 PATIENCE = 10.0  # the same until some variants have converged: of a run of minutes nothing is known before
 ROUNDS = (16, 64, PILOTS)  # pilots, as long as the next round is expected to end in time
+FIRST = 4  # pilots before these, where there are several scenes: of one to four, for which there is more patience
 # What is said of the next five was measured with the built-in studies on two threads; the spread is over these.
 CLIMB = 10.0  # times the convergence of a few variants that pilots take on the ladder: 2 to 23
 MARCHED = 0.07  # of that convergence that a scene's march takes by what pilots tell: of swept motions on frames
 BROKEN_OFF = 2.5  # times the seconds after which some pilots were broken off that all of them take: 2 to 3
-START = 6.0  # s until processes have started and loaded kernels: 5 to 7
 AUDIT = 1.7  # times that convergence that an audit takes, one level beyond it: 1.1 to 4.3
 UNFINISHED = 2.0  # times the seconds in which variants did not converge that they take
 AROUND = 1.6  # times loading and planning: gathering and writing take about half as much
@@ -44,6 +48,13 @@ class Forecast(NamedTuple):
     remark: str = ""
 
 
+class Ends(NamedTuple):
+    """Until when there is time to measure: more than enough, and something."""
+
+    usual: float
+    last: float
+
+
 class Looked(NamedTuple):
     """What some variants converged with, and the seconds that those of a scene take, in the mean of some scenes."""
 
@@ -60,11 +71,19 @@ def forecast(
     around = AROUND * time.process_time()
     warm_up(plan)
     begun = time.perf_counter()
-    end = begun + seconds
     groups = [ConvergingGroup(*scene) for scene in zip(plan.grids, plan.members, strict=True)]
     looked = _converge(plan, groups, partial(_past, begun + patience))
-    found = _of_convergence(plan, looked, threads) if plan.converges else _choose(plan, threads, looked, end, rounds)
+    if plan.converges:
+        found = _of_convergence(plan, looked, threads)
+    else:
+        with _where_it_runs(plan, threads) as here:
+            found = _choose(plan, here, looked, Ends(begun + seconds, begun + patience), rounds)
     return found._replace(seconds=found.seconds + around + _audit(found.plan, looked, threads))
+
+
+def _where_it_runs(plan: Plan, threads: int) -> AbstractContextManager[Place]:
+    """Where a run does its jobs, on so many threads or cores."""
+    return in_processes({}) if plan.many_scenes and threads == cores() else place(threads)
 
 
 def _audit(plan: Plan, looked: Looked, threads: int) -> float:
@@ -99,7 +118,7 @@ def _of_convergence(plan: Plan, looked: Looked, threads: int) -> Forecast:
     """A study whose variants all converge by themselves."""
     # Each has tables of its own. They take longer than its marches, and two threads hardly make them at the same time.
     chunks = sum(1 for _ in plan.chunks(None, None))
-    seconds = looked.seconds * chunks + plan.seconds / min(threads, chunks)
+    seconds = looked.seconds * chunks / (threads if plan.many_scenes else 1) + plan.seconds / min(threads, chunks)
     if not looked.parts:
         less = f"{PATIENCE:.0f} seconds were not enough for a variant to converge: this may take longer"
         return Forecast(plan, "", (), seconds, less)
@@ -108,47 +127,68 @@ def _of_convergence(plan: Plan, looked: Looked, threads: int) -> Forecast:
 
 
 def _without_pilots(plan: Plan, looked: Looked, threads: int, tried: float) -> Forecast:
-    """A study whose pilots take longer than there is time; tried: seconds after which some were broken off, 0 where
-    there was no time to begin."""
+    """A study whose pilots take longer than there is time; tried: seconds after which some of all were broken off, 0
+    where there was no time to begin."""
     pilots = pilots_of(plan.cases, plan.members).size
     less = f"there was no time for pilots: a run measures {pilots}, and takes what they show to be enough"
     scenes = scenes_of_pilots(len(plan.grids), plan.size, usual_pilots(plan.size))
     seconds = max(BROKEN_OFF * tried, CLIMB * looked.seconds * scenes / min(threads, scenes))
     seconds += MARCHED * looked.seconds * len(plan.grids) / (threads if plan.many_scenes else 1)
-    seconds += START * plan.many_scenes
     if not looked.parts:
         return Forecast(plan, "", (), seconds, f"{less}; this may take longer")
     title = f"What {counted(len(looked.parts), 'variant')} converged with; a run takes no more than it needs"
     return Forecast(plan, title, chosen.rows(looked.parts), seconds, less)
 
 
-def _choose(plan: Plan, threads: int, looked: Looked, end: float, rounds: Sequence[int]) -> Forecast:
+def _choose(plan: Plan, here: Place, looked: Looked, ends: Ends, rounds: Sequence[int]) -> Forecast:
     """More and more pilots, as many as there is time for."""
-    found, took, tried = None, 0.5 * CLIMB * looked.seconds / LONGER, 0.0
-    for pilots in rounds:
+    several, found, start, tried = len(plan.grids) > 1, None, 0.0, 0.0
+    expected = 0.0 if several else 0.5 * CLIMB * looked.seconds
+    for pilots in (*(FIRST,) * several, *rounds):
         trial, started = replace(plan), time.perf_counter()
-        if not looked.parts or started + LONGER * took > end:
+        end = ends.last if several and found is None else ends.usual
+        if not looked.parts or started + expected > end:
             break
+        share = Shared(here, partial(_past, end))
         try:
-            trial.choose(Shared(Threads(threads), partial(_past, end)), pilots)
+            if found is None:
+                share(plan, [Job(_awake, NOBODY)] * here.slots)
+                start, started = time.perf_counter() - started, time.perf_counter()
+            trial.choose(share, pilots)
         except Halted:
             tried = time.perf_counter() - started
             break
-        took = time.perf_counter() - started
-        found = trial, pilots, took
-    if found is None:
-        return _without_pilots(plan, looked, threads, tried)
-    trial, pilots, took = found
-    usual, drawn = usual_pilots(plan.size), pilots_of(plan.cases, plan.members).size
-    more = "" if pilots >= usual else f"; a run measures {drawn} and knows better"
-    title = f"What variants are computed with, by the measured errors of {min(pilots, drawn)} pilots{more}"
+        found = _Round(trial, pilots, time.perf_counter() - started)
+        expected = LONGER * found.took
+    return _of_pilots(found, here.slots, start) if found else _without_pilots(plan, looked, here.slots, tried)
+
+
+def _awake(plan: Plan, lanes: Counts, halted: Callable[[], bool]) -> None:
+    """A job that loads the kernels."""
+    warm_up(plan)
+
+
+class _Round(NamedTuple):
+    """Pilots that were measured: the plan with what they chose, how many were wanted, and their seconds."""
+
+    trial: Plan
+    pilots: int
+    took: float
+
+
+def _of_pilots(found: _Round, threads: int, start: float) -> Forecast:
+    """A study of which some pilots are measured; start: seconds until its processes have started."""
+    plan, usual = found.trial, usual_pilots(found.trial.size)
+    measured, drawn = (pilots_of(plan.cases, plan.members, count).size for count in (found.pilots, PILOTS))
     scenes, more_scenes = (
-        scenes_of_pilots(len(plan.grids), plan.size, count) for count in (pilots, max(usual, pilots))
+        scenes_of_pilots(len(plan.grids), plan.size, count) for count in (found.pilots, max(usual, found.pilots))
     )
-    longer = more_scenes / scenes * max(1.0, usual * scenes / (pilots * more_scenes)) ** 0.5
-    pace, tables = _pace(trial)
-    seconds = START * plan.many_scenes + took * longer + (trial.seconds * pace + tables * len(trial.groups)) / threads
-    return Forecast(trial, title, chosen.rows(chosen.chosen(trial)), seconds)
+    longer = more_scenes / scenes * max(1.0, drawn * scenes / (measured * more_scenes)) ** 0.5
+    more = "" if measured >= drawn else f"; a run measures {drawn} and knows better"
+    title = f"What variants are computed with, by the measured errors of {measured} pilots{more}"
+    pace, tables = _pace(plan)
+    march = plan.seconds * pace + tables * len(plan.groups)
+    return Forecast(plan, title, chosen.rows(chosen.chosen(plan)), start + found.took * longer + march / threads)
 
 
 def _pace(plan: Plan) -> tuple[float, float]:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from engine.accuracy.jobs import Job
 from engine.march.stepper import Halted
 from results_schema.arrays import Counts
+from results_schema.cores import cores
 from results_schema.errors import Interrupted, WorkersGaveUp
 from results_schema.lazy_imports import xr
 from results_schema.store.rows import Chunk, Collector, Gatherer, Rows, RowsOnDisk, joined
@@ -55,7 +56,7 @@ class Work:
         chunk: int | None = None,
         place: Place | None = None,
     ) -> None:
-        from engine.batch.executors import Threads, cores
+        from engine.batch.executors import Threads
 
         self.place: Place = place or Threads(threads or cores())
         self.stop = stop or Stop()

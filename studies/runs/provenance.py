@@ -1,6 +1,5 @@
 """What an archive says of its making: the study, the program and its packages, the machine, the time."""
 
-import os
 import platform
 from collections.abc import Mapping
 from datetime import UTC, datetime
@@ -9,6 +8,7 @@ from typing import Any
 
 from engine.batch.handshake import version_of
 from engine.scene.study import Study
+from results_schema.cores import cores
 from results_schema.store.archive import FILES, files_text
 from results_schema.store.reading import SCHEMA_VERSION
 from studies.protocol.study import study_attributes
@@ -40,8 +40,8 @@ def attributes(study: Study, key: str, seconds: float) -> Mapping[str, Any]:
 
 def machine() -> str:
     """The machine in one line: processor, number of cores, system."""
-    cores = len(os.sched_getaffinity(0))
-    return f"{_processor()}, {cores} core{'s' if cores > 1 else ''}, {platform.system()} {platform.release()}"
+    count = cores()
+    return f"{_processor()}, {count} core{'s' if count > 1 else ''}, {platform.system()} {platform.release()}"
 
 
 def _processor() -> str:

@@ -15,7 +15,7 @@ from engine.batch import executors
 from engine.batch.chunk import MOST_IN_JOB, jobs_of
 from engine.batch.execution import choose
 from engine.batch.executors import Threads, in_processes
-from engine.batch.plan import FEW_SCENES, make_plan
+from engine.batch.plan import FEW_CLIMBING, FEW_CONVERGING, FEW_SCENES, make_plan
 from engine.batch.processes import Cores, on_cores
 from engine.march.stepper import Halted as Gone
 from engine.scene.study import Study
@@ -41,6 +41,12 @@ def of_many_scenes(count: int = FEW_SCENES + 12) -> Study:
     return study(beam(modes=2), mass(0.5, cruise(0.0, 1.0, 1.0)), kind="passage", solver=fixed, sweep=sweep)
 
 
+def of_many_variants(scenes: int) -> Study:
+    """So many scenes for which pilots choose."""
+    weights = {"of": "carriage.car.mass", "from": 0.1, "to": 0.4, "count": 300}
+    return of_many_scenes(scenes).with_values({"sweep.weight": weights})
+
+
 def test_many_scenes_are_run_in_processes_and_give_the_same_bits(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where nobody says otherwise; a machine may have one core."""
     monkeypatch.setattr(executors, "cores", lambda: 2)
@@ -50,9 +56,11 @@ def test_many_scenes_are_run_in_processes_and_give_the_same_bits(monkeypatch: py
         assert type(here).__name__ == "Cores" and here.slots == 2
     with parts.place({"threads": 1}) as here:
         assert type(here).__name__ == "Threads" and here.threads == 1
-    few = of_many_scenes(3)
-    with kind_of(few).parts(few).place({}) as here:
-        assert type(here).__name__ == "Threads" and here.threads == 2
+    for few in (of_many_scenes(FEW_CONVERGING), of_many_variants(FEW_CLIMBING)):
+        with kind_of(few).parts(few).place({}) as here:
+            assert type(here).__name__ == "Threads" and here.threads == 2
+    for more in (of_many_scenes(FEW_CONVERGING + 1), of_many_variants(FEW_CLIMBING + 1)):
+        assert make_plan(more).many_scenes and make_plan(more).memory_bytes > 800 * 2**20
     by_processes, by_thread = studies.run(given), studies.run(given, threads=1)
     for name in by_thread.variables:
         np.testing.assert_array_equal(by_processes[name].values, by_thread[name].values, err_msg=str(name))

@@ -116,5 +116,18 @@ def test_scenes_of_pilots_are_shared_out(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(forecasting, "_audit", lambda *_: 0.0)
     monkeypatch.setattr(forecasting, "AROUND", 0.0)
     marched = 40 * forecasting.MARCHED * 2.0
-    assert forecast(found, 2, -1.0).seconds == 8 * forecasting.CLIMB * 2.0 + marched
-    assert forecast(found, 64, -1.0).seconds == forecasting.CLIMB * 2.0 + marched
+    assert forecast(found, 2, -1.0).seconds == 8 * forecasting.CLIMB * 2.0 + marched / 2
+    assert forecast(found, 64, -1.0).seconds == forecasting.CLIMB * 2.0 + marched / 64
+
+
+def test_of_several_scenes_a_few_pilots_are_measured_with_more_patience() -> None:
+    """Four of 40 scenes, which the title says; what all pilots take is told by these."""
+    lengths = {"of": "body.bed.length", "from": 1.0, "to": 2.0, "count": 40}
+    found = planned(beam(modes="auto"), {"length": lengths, "speed": SPEEDS | {"count": 30}}, tolerance=1e-2)
+    seen = forecast(found, 1, -1.0)
+    assert "4 pilots; a run measures 128 and knows better" in seen.title and seen.remark == ""
+    assert (
+        seen.seconds > 0.0 and sum(int(count.replace(",", "")) for count in column(list(seen.rows), "variants")) == 1200
+    )
+    hurried = forecast(found, 1, -1.0, patience=-1.0)
+    assert "there was no time for pilots" in hurried.remark

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from functools import cached_property, lru_cache
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -76,29 +76,39 @@ class PointToPoint(Motion):
 
     def law(self, tau: Array, side: Side) -> Path:
         times = np.asarray(tau, dtype=np.float64)
-        return self._in_phases(times, np.searchsorted(self._bounds, times, side=side))
+        phase = np.clip(np.searchsorted(self._bounds, times, side=side), *self._phases)
+        path = self._in_phase(times, int(phase.min(initial=PHASES)))
+        for later in np.unique(phase)[1:]:
+            here = phase == later
+            for part, values in zip(path, self._in_phase(times[here], int(later)), strict=True):
+                part[here] = values
+        return path
 
     def path_on(self, tau: ArrayLike, segment_start: float, segment_end: float) -> Path:
         times = np.minimum(np.maximum(np.asarray(tau, dtype=np.float64), segment_start), segment_end)
-        middle = 0.5 * (segment_start + segment_end)  # all of it in one phase
-        return self._in_phases(times, np.searchsorted(self._bounds, middle))
+        reached = int(np.searchsorted(self._bounds, 0.5 * (segment_start + segment_end)))  # all of it in one phase
+        first, last = self._phases
+        return self._in_phase(times, min(max(reached, first), last))
 
-    def _in_phases(self, times: Array, reached: Any) -> Path:
-        """At times (S,) in phases (S,), or all in one. Its second half, and the rest, are the first one backward, so
-        that it comes to rest exactly."""
-        way, scale = self.end - self.start, self.time_scale
-        first = np.searchsorted(self._bounds, 0.0, side="right")  # without a jerk the first phase takes no time
-        last = PHASES - 1 if self.dwell > 0.0 else PHASES - 2 - first
-        phase = np.minimum(np.maximum(reached, first), last)
-        back = phase >= PHASES // 2
-        k = np.where(back, np.maximum(PHASES - 2 - phase, 0), phase)
-        starts, (c0, c1, c2, c3) = self._pieces[:, 0], np.moveaxis(self._pieces[k, 1:], -1, 0)
-        since = np.where(back, self._move.duration - times * scale, times * scale)
-        u = np.minimum(np.maximum(since, starts[k]), starts[k + 1]) - starts[k]  # rounding must not leave the phase
+    @property
+    def _phases(self) -> tuple[int, int]:
+        """The first phase, without a jerk the second, as that one takes no time then; and the last one."""
+        first = int(np.searchsorted(self._bounds, 0.0, side="right"))
+        return first, PHASES - 1 if self.dwell > 0.0 else PHASES - 2 - first
+
+    def _in_phase(self, times: Array, phase: int) -> Path:
+        """At times (S,) in a phase. Its second half, and the rest, are the first one backward, so that it comes to rest
+        exactly."""
+        way, scale, back = self.end - self.start, self.time_scale, phase >= PHASES // 2
+        k = max(PHASES - 2 - phase, 0) if back else phase
+        (begins, c0, c1, c2, c3), ends = self._pieces[k], self._pieces[k + 1, 0]
+        since = self._move.duration - times * scale if back else times * scale
+        u = np.minimum(np.maximum(since, begins), ends) - begins  # rounding must not leave the phase
         gone, rate = c0 + u * (c1 + u * (c2 + u * c3)), c1 + u * (2.0 * c2 + 3.0 * u * c3)
-        push = np.where(back, -1.0, 1.0) * (2.0 * c2 + 6.0 * u * c3)
-        place = np.where(back, self.end - way * gone, self.start + way * gone)
-        return Path(place, way * scale * rate, way * scale**2 * push)
+        push = 2.0 * c2 + 6.0 * u * c3
+        if back:
+            return Path(self.end - way * gone, way * scale * rate, -way * scale**2 * push)
+        return Path(self.start + way * gone, way * scale * rate, way * scale**2 * push)
 
     def pieces(self, number: Number) -> Array:
         return move_pieces(number)
@@ -121,5 +131,6 @@ class PointToPoint(Motion):
 
 @lru_cache(maxsize=256)
 def _tables(move: Profile) -> tuple[Array, Array]:
-    """Its pieces and bounds, which every segment of every march asks for."""
+    """Its pieces and bounds, which every segment of every march asks for; motions, which are compared, keep no
+    arrays."""
     return move.pieces(), move.bounds
