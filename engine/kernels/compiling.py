@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -9,8 +10,13 @@ from contextlib import contextmanager
 WORDS = "compiling kernels for this kind of scene, once on this machine: up to half a minute"
 
 
+def log(words: str) -> None:
+    """Tell who uses the package from Python, on standard error unless logging is set up otherwise."""
+    logging.getLogger("wanderlast").warning(words)
+
+
 @contextmanager
-def told_of_compiling(tell: Callable[[str], object]) -> Iterator[None]:
+def told_of_compiling(tell: Callable[[str], object] = log) -> Iterator[None]:
     """Tell once if a kernel is compiled meanwhile, as the cache on the disk does not hold it."""
     from numba.core import event
 

@@ -273,12 +273,13 @@ def kind_of(study: Study) -> Kind:
 
 def run(study: Study | str | Path, **options: Any) -> xr.Dataset:
     """Run a study, or that of a file, in memory: the dataset of its archive. Raises BadInput; what is allowed and yet
-    often a mistake is a warning, a `Remark`.
+    often a mistake is a warning, a `Remark`; that kernels are compiled is logged to "wanderlast".
 
     options: progress and chunk, and where to run, as of `engine.run`. Meanwhile numpy's linear algebra keeps to one
     thread in the whole process.
     """
     from engine.batch.executors import Where, check_chunk, check_options
+    from engine.kernels.compiling import told_of_compiling
     from engine.scene.study import study_of
 
     started = time.perf_counter()
@@ -290,7 +291,7 @@ def run(study: Study | str | Path, **options: Any) -> xr.Dataset:
     for remark in parts.remarks:
         warnings.warn(remark, Remark, stacklevel=2)
     where: Any = {key: options.pop(key) for key in Where.__annotations__ if key in options}
-    with parts.place(where) as here:
+    with told_of_compiling(), parts.place(where) as here:
         progress = options.get("progress")
         listener = NOBODY if progress is None else Listener(progress)
         parts.compute(store, Work(place=here, listener=listener, chunk=options.get("chunk")))
