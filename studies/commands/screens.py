@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 BESIDE = ("_position", "_time", "_rms", "_used", "elapsed")  # endings of what `info` lists with --all alone
 LONGEST_LIST = 300  # letters
 MOST_ALIKE = 4  # results that are the same in every variant and told with their value
+RESIDUAL = "_residual"  # ending of residual vibrations
 TALLEST = 4  # lines of a row of that table
 MOST_ROWS = 14  # of the table at the end of a run, which is to stay on the screen
 
@@ -125,7 +126,7 @@ def show_outcome(outcome: Outcome) -> None:
     said, left = answer_of(results), left_out_of_answer(results)
     paragraphs(*said, *([f"{counted(left, 'more sentence')}: run -v, or the report."] if left else []))
     if not summary.is_measured(outcome.results):  # the grid of those that measure is of methods: its ends say nothing
-        _ranges(summary.in_tables(results), results.percentiles, summary.every(results))
+        show_ranges(summary.in_tables(results), results.percentiles, summary.every(results))
         _percentiles(results, [_name(one) for one in summary.in_tables(results)][:MOST_ROWS])
     _show_accuracy(outcome, results)
 
@@ -160,7 +161,7 @@ def show_details(outcome: Outcome) -> None:
     _show_accuracy(outcome, results, *told_choices(results), *told_audit(outcome.audit, results))
 
 
-def _ranges(found: Sequence[Range], percentiles: Sequence[float], every: str) -> None:
+def show_ranges(found: Sequence[Range], percentiles: Sequence[float], every: str) -> None:
     """Each result with its range, and where the end is that tells most; in a sentence those that do not change.
 
     every: those over which they do not, in words.
@@ -190,9 +191,15 @@ def _ranges(found: Sequence[Range], percentiles: Sequence[float], every: str) ->
         paragraphs(f"The same in {every}: {', '.join(same[:MOST_ALIKE])}{more}.")
     if some := [f"{words} {one.partly}" for one, words in alike if one.partly]:
         paragraphs(f"The same where there is one: {', '.join(some[:MOST_ALIKE])}.")
-    loose = [f"{_name(one)} {one.said(one.extreme)}" for one in found if one.is_loose]
-    if loose:
-        paragraphs(f"Told errors of more than a tenth of the value: {', '.join(loose)}.")
+    if loose := [one for one in found if one.is_loose]:
+        words = ", ".join(f"{_name(one)} {one.said(one.extreme)}" for one in loose)
+        paragraphs(f"Told errors of more than a tenth of the value: {words}.{_closer(loose)}")
+
+
+def _closer(loose: Sequence[Range]) -> str:
+    """What tells residual vibrations closer, which are held to a part of a sensor's largest static value."""
+    ringing = next((one.name.removesuffix(RESIDUAL) for one in loose if one.name.endswith(RESIDUAL)), "")
+    return f" Residual vibrations are told closer by a smaller tolerance (sensor.{ringing}.tolerance)." * bool(ringing)
 
 
 def _where(found: Range) -> str:

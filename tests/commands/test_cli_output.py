@@ -10,7 +10,9 @@ from pathlib import Path
 import pytest
 
 from engine.kernels.compiling import WORDS
+from studies.commands import screens
 from studies.commands.console import paragraphs, progress_bar, say_compiling
+from studies.reporting.summary import Extreme, Range
 from tests.studies.small import ROOT, SEPARATED, command, finish, write
 
 
@@ -147,3 +149,15 @@ def test_sentences_break_neither_numbers_nor_before_units(
     monkeypatch.setenv("COLUMNS", "16")
     paragraphs("with car at 7.53 m, 15.2 kN m ± 3 N m")
     assert capsys.readouterr().out == "with car at\n7.53 m,\n15.2 kN m\n± 3 N m\n"
+
+
+@pytest.mark.parametrize(("name", "closer"), [("tool_residual", True), ("tool_max", False)])
+def test_loose_residual_vibrations_are_told_with_the_key_that_tells_them_closer(
+    capsys: pytest.CaptureFixture[str], name: str, closer: bool
+) -> None:
+    """They are held to a part of the largest static value, which may be a thousand times as large."""
+    ends = [Extreme(value, {}, {"mass": "1 kg"}, error=0.5e-6) for value in (1e-6, 2e-6)]
+    screens.show_ranges([Range(name, "", "m", *ends)], (), "every variant")
+    said = " ".join(capsys.readouterr().out.split())
+    assert "more than a tenth of the value: " in said and "2 µm ± 500 nm" in said
+    assert ("smaller tolerance (sensor.tool.tolerance)" in said) == closer
