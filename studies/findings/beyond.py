@@ -254,8 +254,8 @@ def _in_one_unit(axis: Axis, parts: list[Array]) -> str:
 
 
 def _common(results: Results, along: Axis, which: Mask) -> str:
-    """What else is swept and has not all of its values among some variants, in brackets; "some of", or "not with every"
-    where it has all, where not every combination of these with the values of ``along`` is among them."""
+    """What else is swept and has not all of its values among some variants, in brackets; "not throughout", or "not with
+    every" where it has all, where not every combination of these with the values of ``along`` is among them."""
     others = [axis for axis in results.axes if axis.name != along.name and axis.values.size > 1]
     swept = {axis.name: results.everywhere(results.dataset[axis.name]) for axis in (along, *others)}
     own = {name: np.unique(values[which]) for name, values in swept.items()}
@@ -267,5 +267,5 @@ def _common(results: Results, along: Axis, which: Mask) -> str:
     among = np.logical_and.reduce([np.isin(values, own[name]) for name, values in swept.items()])
     full = not (among & results.with_values & ~which).any()
     if told:
-        return f" ({'' if full else 'some of '}{', '.join(told)})"
+        return f" ({', '.join(told)}{'' if full else ', not throughout'})"
     return "" if full else f" (not with every {listed([axis.noun for axis in others])})"

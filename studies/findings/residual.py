@@ -103,9 +103,9 @@ def _residual(results: Results, sensor: str, asked: AskedOfRest) -> str:
     between = _told_between(results, values, place)
     if limit is None:
         return f"{said}{settled}.{between}"
-    over = f" of {axis.noun}" if axis is not None and axis.dim != VARIANT else ""
+    over = f"over {axis.noun} " if axis is not None and axis.dim != VARIANT else ""
     beyond = f"{quantity(limit, units)}{out_of_reach(limit, size)} {where_beyond(results, values, limit, axis)}"
-    return f"{said}; it exceeds {beyond}{over}{settled}.{between}"
+    return f"{said}; {over}it exceeds {beyond}{settled}.{between}"
 
 
 def _told_between(results: Results, values: Array, place: Index) -> str:

@@ -132,7 +132,7 @@ def test_up_to_eight_parts_of_a_sweep_are_listed_with_one_unit(speeds: tuple[int
 def test_what_else_is_swept_stands_with_few_parts_or_once_behind_all() -> None:
     assert beyond(1, 3, masses=(2, 2)) == "at 1 and 3 km/h (mass 70 kg)"
     assert beyond(1, 3, masses=(2, 3)) == "at 1 km/h (mass 70 kg) and at 3 km/h (mass 80 kg)"
-    assert beyond(1, 3, 5, 7, masses=(2, 2, 1, 2)) == "at 1, 3, 5 and 7 km/h (some of mass 60 kg to 70 kg)"
+    assert beyond(1, 3, 5, 7, masses=(2, 2, 1, 2)) == "at 1, 3, 5 and 7 km/h (mass 60 kg to 70 kg, not throughout)"
 
 
 def part_of(values: str, exceeded: list[list[bool]]) -> str:

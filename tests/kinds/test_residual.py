@@ -42,7 +42,7 @@ def test_it_is_said_where_a_limit_is_exceeded(kind: str) -> None:
     limited = studies.run(stops(kind, question={"residual": {"displacement": 17e-3}}))
     np.testing.assert_array_equal(limited.midspan_residual.values, sizes)
     (said,) = (text for text in answers.answer(limited) if "at rest" in text)
-    where = "it exceeds 17 mm at 6 to 12 m/s² of acceleration"
+    where = "over acceleration it exceeds 17 mm at 6 to 12 m/s²"
     assert said.endswith(f"at rest it still swings by up to 19.3 mm at acceleration 6 m/s²; {where}.")
     (short,) = (text for text in answers.answer(found) if "at rest" in text)
     assert short == said.replace(f"; {where}", "")
@@ -139,7 +139,7 @@ def test_no_variant_beyond_a_limit_is_said_so() -> None:
     twice = SWEPT | {"zeta": {"of": "body.bed.damping_ratio", "values": [0.01, 0.02]}}
     found = studies.run(stops(sweep=twice, question={"residual": {"displacement": 1.0}}))
     (said,) = (text for text in answers.answer(found) if "at rest" in text)
-    assert said.endswith("it exceeds 1 m nowhere from 2 m/s² to 30 m/s² of acceleration.")
+    assert said.endswith("over acceleration it exceeds 1 m nowhere from 2 m/s² to 30 m/s².")
 
 
 def test_a_limit_in_another_unit_is_doubted() -> None:
@@ -243,7 +243,7 @@ def test_what_has_not_settled_everywhere_is_not_the_same_everywhere(
     )
     (time,) = (one for one in summary.in_tables(Results.of(found)) if one.name == "midspan_settling_time")
     assert time.is_constant and time.partly == "in 1 of 2 variants"
-    screens._ranges([time], [], "every variant")
+    screens.show_ranges([time], [], "every variant")
     assert " ".join(capsys.readouterr().out.split()).endswith(
         "The same where there is one: midspan_settling_time 0 s in 1 of 2 variants."
     )
@@ -288,6 +288,17 @@ def test_of_samples_a_limit_is_exceeded_in_so_many_variants() -> None:
     found["midspan_residual"].values[:] = [18e-3, 1e-3, 1e-3, 1e-3]
     (said,) = (text for text in answers.answer(found) if "at rest" in text)
     assert "it exceeds 17 mm in 1 variant of 4." in said
+
+
+@pytest.mark.parametrize(("most", "said"), [(4, "Bars: the estimated error."), (3, "errors of midspan: at most ")])
+def test_of_samples_errors_are_drawn_as_long_as_they_do_not_hide_the_points(
+    monkeypatch: pytest.MonkeyPatch, most: int, said: str
+) -> None:
+    monkeypatch.setattr("studies.pictures.common.residual.MOST_BARS", most)
+    swept = {"acceleration": {"of": "carriage.car.motion.acceleration", "from": 2, "to": 30, "sobol": 4}}
+    figure = drawn(studies.run(stops(sweep=swept)))["residual"]
+    bars = [part for part in figure.drawing.axes[0].collections if part.__class__.__name__ == "LineCollection"]
+    assert said in figure.caption and bool(bars) == (most == 4)
 
 
 @pytest.mark.parametrize("kind", ["passage", "trajectory"])

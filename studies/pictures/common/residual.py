@@ -37,6 +37,7 @@ from studies.results.results import Results
 
 MOST_HISTORIES = 3
 PER_SWING = 8  # stations to a period of what rings: of fewer the farthest may stand an eighth short of it
+MOST_BARS = 100  # of points with one each: more hide the points
 BAND = 0.3  # of their colour that bands have together
 
 
@@ -127,10 +128,24 @@ def _over_sweep(results: Results, name: str, rows: list[Row], title: str, words:
         return []
     seen = view(results, first, [path for paths in others for path in paths], top)
     said, *more = words
-    caption = seen.caption(said, f"{'Bars' if seen.is_sampled else 'Bands'}: the estimated error.", *more)
+    caption = seen.caption(said, _told_errors(seen, rows[0]), *more)
     height = 0.9 + 1.9 * len(rows)
     curves = draw(name, f"{title},{in_words(results, top)}", caption, height, partial(_draw_sweep, seen, rows))
     return [telling_limits(curves), *_map(results, name, rows[0], said)]
+
+
+def _told_errors(seen: View, row: Row) -> str:
+    """What is seen of estimated errors, or how large they are where they would hide the points."""
+    if not seen.is_sampled:
+        return "Bands: the estimated error."
+    if _has_bars(seen):
+        return "Bars: the estimated error."
+    most = quantity(float(np.nanmax(row.errors, initial=0.0)), row.units, 2)
+    return f"Estimated errors of {row.sensor.replace('_', ' ')}: at most {most}."
+
+
+def _has_bars(seen: View) -> bool:
+    return seen.is_sampled and seen.points.size <= MOST_BARS
 
 
 def _map(results: Results, name: str, row: Row, said: str) -> list[Figure]:
@@ -165,10 +180,10 @@ def _draw_row(axes: Axes, seen: View, row: Row) -> None:
     if seen.y is not None and coincide(curves):
         bands = [(curves[-1], bounds[-1], BLUE)]
     for curve, off, colour in bands:
-        if seen.is_sampled:
+        if _has_bars(seen):
             at = seen.points
             axes.errorbar(curve.x[at], curve.y[at], off[at], fmt="none", ecolor=colour, alpha=0.5, linewidth=0.7)
-        else:
+        elif not seen.is_sampled:
             axes.fill_between(
                 curve.x, curve.y - off, curve.y + off, color=colour, alpha=BAND / len(bands), linewidth=0.0
             )
