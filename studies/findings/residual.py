@@ -158,7 +158,7 @@ def _not_settled(results: Results, left: Mask, axis: Axis | None) -> str:
     """How many variants have not settled by the end of their runs, and which these are."""
     have = f"{counted(int(left.sum()), 'variant')} {'have' if left.sum() > 1 else 'has'}"
     along = axis is not None and axis.dim != VARIANT
-    where = f", {where_beyond(results, left.astype(float), 0.5, axis)} of {axis.noun}" if axis and along else ""
+    where = f", over {axis.noun} {where_beyond(results, left.astype(float), 0.5, axis)}" if axis and along else ""
     return f"{have} not settled by the end of the run{where}: a longer rest tells when"
 
 
