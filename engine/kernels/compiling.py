@@ -16,25 +16,32 @@ def log(words: str) -> None:
 
 
 @contextmanager
-def told_of_compiling(tell: Callable[[str], object] = log) -> Iterator[None]:
-    """Tell once if a kernel is compiled meanwhile, as the cache on the disk does not hold it."""
+def told_of_compiling(tell: Callable[[str], object] = log) -> Iterator[Callable[[], float]]:
+    """Tell once if a kernel is compiled meanwhile, as the cache on the disk does not hold it. Yields what says for how
+    many seconds kernels have been compiled so far."""
     from numba.core import event
 
-    class First(event.Listener):
-        """Tells of the first one."""
+    class Compiling(event.Listener):
+        """Tells of the first one; kernels compile those that they call."""
 
-        told = False
+        told, depth, begun, seconds = False, 0, 0.0, 0.0
 
         def on_start(self, _: object) -> None:
             if not self.told:
                 self.told = True
                 tell(WORDS)
+            if self.depth == 0:
+                self.begun = time.perf_counter()
+            self.depth += 1
 
         def on_end(self, _: object) -> None:
-            """Nothing to say."""
+            self.depth -= 1
+            if self.depth == 0:
+                self.seconds += time.perf_counter() - self.begun
 
-    with event.install_listener("numba:compile", First()):
-        yield
+    listener = Compiling()
+    with event.install_listener("numba:compile", listener):
+        yield lambda: listener.seconds
 
 
 @contextmanager

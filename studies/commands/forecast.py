@@ -34,6 +34,7 @@ UNFINISHED = 2.0  # times the seconds in which variants did not converge that th
 AROUND = 1.6  # times loading and planning: gathering and writing take about half as much
 LONGER = 2.5  # times a round that the next one takes: four times the pilots by the same tables
 CONVERGED, SCENES = 8, 3  # variants that converge, and scenes that they are of
+Clock = Callable[[], float]
 TIMED = 1024  # variants by which the pace of the march is measured
 
 
@@ -48,11 +49,12 @@ class Forecast(NamedTuple):
     remark: str = ""
 
 
-class Ends(NamedTuple):
-    """Until when there is time to measure: more than enough, and something."""
+class Time(NamedTuple):
+    """Until when there is time to measure, usually and for what must be known, by a clock."""
 
     usual: float
     last: float
+    clock: Clock
 
 
 class Looked(NamedTuple):
@@ -62,22 +64,33 @@ class Looked(NamedTuple):
     seconds: float
 
 
+def nothing() -> float:
+    """No seconds."""
+    return 0.0
+
+
 @one_thread()
 def forecast(
-    plan: Plan, threads: int, seconds: float = SECONDS, rounds: Sequence[int] = ROUNDS, patience: float = PATIENCE
+    plan: Plan,
+    threads: int,
+    seconds: float = SECONDS,
+    rounds: Sequence[int] = ROUNDS,
+    patience: float = PATIENCE,
+    compiled: Clock = nothing,
 ) -> Forecast:
     """What is measured within so many seconds: how some variants converge, for which there is more ``patience``, then
-    as many pilots as there is time for."""
-    around = AROUND * time.process_time()
+    as many pilots as there is time for; compiled: seconds in which kernels were compiled so far, which do not count."""
+    around = AROUND * (time.process_time() - compiled())
     warm_up(plan)
-    begun = time.perf_counter()
+    clock = partial(_without, compiled)
+    begun = clock()
     groups = [ConvergingGroup(*scene) for scene in zip(plan.grids, plan.members, strict=True)]
-    looked = _converge(plan, groups, partial(_past, begun + patience))
+    looked = _converge(plan, groups, begun + patience, clock)
     if plan.converges:
         found = _of_convergence(plan, looked, threads)
     else:
         with _where_it_runs(plan, threads) as here:
-            found = _choose(plan, here, looked, Ends(begun + seconds, begun + patience), rounds)
+            found = _choose(plan, here, looked, Time(begun + seconds, begun + patience, clock), rounds)
     return found._replace(seconds=found.seconds + around + _audit(found.plan, looked, threads))
 
 
@@ -95,22 +108,28 @@ def _audit(plan: Plan, looked: Looked, threads: int) -> float:
     return AUDIT * looked.seconds * scenes / min(threads, max(scenes, 1))
 
 
-def _past(end: float) -> bool:
-    return time.perf_counter() > end
+def _without(compiled: Clock) -> float:
+    """Seconds, without those in which kernels were compiled."""
+    return time.perf_counter() - compiled()
 
 
-def _converge(plan: Plan, groups: Sequence[Group], halted: Callable[[], bool]) -> Looked:
-    """Some variants of a few scenes, as they converge."""
+def _past(end: float, clock: Clock) -> bool:
+    return clock() > end
+
+
+def _converge(plan: Plan, groups: Sequence[Group], end: float, clock: Clock) -> Looked:
+    """Some variants of a few scenes, as they converge, as long as there is time."""
+    halted = partial(_past, end, clock)
     parts: list[chosen.Part] = []
     took, some = [], [groups[place] for place in spread(len(groups), SCENES)]
     for group in some:
-        variants, started = group.variants[spread(group.variants.size, CONVERGED // len(some))], time.perf_counter()
+        variants, started = group.variants[spread(group.variants.size, CONVERGED // len(some))], clock()
         try:
             parts += chosen.converged(plan, group.found(plan.values(group, variants), variants, None, halted))
         except Halted:
-            took.append(UNFINISHED * (time.perf_counter() - started))
+            took.append(UNFINISHED * (clock() - started))
             break
-        took.append(time.perf_counter() - started)
+        took.append(clock() - started)
     return Looked(parts, sum(took) / len(took))
 
 
@@ -140,27 +159,29 @@ def _without_pilots(plan: Plan, looked: Looked, threads: int, tried: float) -> F
     return Forecast(plan, title, chosen.rows(looked.parts), seconds, less)
 
 
-def _choose(plan: Plan, here: Place, looked: Looked, ends: Ends, rounds: Sequence[int]) -> Forecast:
+def _choose(plan: Plan, here: Place, looked: Looked, until: Time, rounds: Sequence[int]) -> Forecast:
     """More and more pilots, as many as there is time for."""
     several, found, start, tried = len(plan.grids) > 1, None, 0.0, 0.0
     expected = 0.0 if several else 0.5 * CLIMB * looked.seconds
     for pilots in (*(FIRST,) * several, *rounds):
-        trial, started = replace(plan), time.perf_counter()
-        end = ends.last if several and found is None else ends.usual
+        trial, started = replace(plan), until.clock()
+        end = until.last if several and found is None else until.usual
         if not looked.parts or started + expected > end:
             break
-        share = Shared(here, partial(_past, end))
+        share = Shared(here, partial(_past, end, until.clock))
         try:
             if found is None:
                 share(plan, [Job(_awake, NOBODY)] * here.slots)
-                start, started = time.perf_counter() - started, time.perf_counter()
+                start, started = until.clock() - started, until.clock()
             trial.choose(share, pilots)
         except Halted:
-            tried = time.perf_counter() - started
+            tried = until.clock() - started
             break
-        found = _Round(trial, pilots, time.perf_counter() - started)
+        found = _Round(trial, pilots, until.clock() - started)
         expected = LONGER * found.took
-    return _of_pilots(found, here.slots, start) if found else _without_pilots(plan, looked, here.slots, tried)
+    return (
+        _of_pilots(found, here.slots, start, until.clock) if found else _without_pilots(plan, looked, here.slots, tried)
+    )
 
 
 def _awake(plan: Plan, lanes: Counts, halted: Callable[[], bool]) -> None:
@@ -176,7 +197,7 @@ class _Round(NamedTuple):
     took: float
 
 
-def _of_pilots(found: _Round, threads: int, start: float) -> Forecast:
+def _of_pilots(found: _Round, threads: int, start: float, clock: Clock) -> Forecast:
     """A study of which some pilots are measured; start: seconds until its processes have started."""
     plan, usual = found.trial, usual_pilots(found.trial.size)
     measured, drawn = (pilots_of(plan.cases, plan.members, count).size for count in (found.pilots, PILOTS))
@@ -186,18 +207,18 @@ def _of_pilots(found: _Round, threads: int, start: float) -> Forecast:
     longer = more_scenes / scenes * max(1.0, drawn * scenes / (measured * more_scenes)) ** 0.5
     more = "" if measured >= drawn else f"; a run measures {drawn} and knows better"
     title = f"What variants are computed with, by the measured errors of {measured} pilots{more}"
-    pace, tables = _pace(plan)
+    pace, tables = _pace(plan, clock)
     march = plan.seconds * pace + tables * len(plan.groups)
     return Forecast(plan, title, chosen.rows(chosen.chosen(plan)), start + found.took * longer + march / threads)
 
 
-def _pace(plan: Plan) -> tuple[float, float]:
+def _pace(plan: Plan, clock: Clock) -> tuple[float, float]:
     """Time of the march over the expected, by the group that takes most of it, and seconds that its tables take."""
     group = max(plan.groups, key=lambda group: group.seconds_per_variant * group.variants.size)
     variants, took = group.variants[:TIMED], list[float]()
     for _ in ("makes the tables", "marches"):
-        started = time.perf_counter()
+        started = clock()
         group.found(plan.values(group, variants), variants, plan.choice, lambda: False)
-        took.append(time.perf_counter() - started)
+        took.append(clock() - started)
     expected, tables = group.seconds_per_variant * variants.size, max(0.0, took[0] - took[1])
     return took[1] / expected if expected > 0.0 else 1.0, tables

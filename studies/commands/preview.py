@@ -25,7 +25,7 @@ from engine.scene.variants import VariantValues
 from engine.statics.coupled_modes import CoupledModes, coupled_modes
 from results_schema.arrays import Array
 from studies.commands import planned_numerics as chosen
-from studies.commands.forecast import AROUND, Forecast, forecast
+from studies.commands.forecast import AROUND, Clock, Forecast, forecast, nothing
 from studies.commands.sampled import sampled
 from studies.findings.in_step import speeds_in_step
 from studies.protocol.parts import Foreseen, Pieces, TextTable, Variants
@@ -56,16 +56,17 @@ class Preview:
 
 
 @singledispatch
-def preview(parts: Any, threads: int) -> Preview:
-    """The explanation of a study's work for so many threads."""
+def preview(parts: Any, threads: int, compiled: Clock = nothing) -> Preview:
+    """The explanation of a study's work for so many threads. compiled: seconds in which kernels were compiled so far,
+    as only a first run does."""
     raise NotImplementedError
 
 
 @preview.register
-def _of_variants(parts: Variants, threads: int) -> Preview:
+def _of_variants(parts: Variants, threads: int, compiled: Clock = nothing) -> Preview:
     """That of a plan, from a few seconds of measuring."""
     plan = parts.plan
-    seen = forecast(plan, threads)
+    seen = forecast(plan, threads, compiled=compiled)
     tables = (
         *(_study(plan), _bodies(plan.base), _tracks(plan.base), *_checks(plan.base)),
         *(_limits(plan.base), _sprung(plan), _standing(plan)),
@@ -104,11 +105,11 @@ def _audited(variants: int, wanted: int | str) -> str:
 
 
 @preview.register
-def _of_pieces(parts: Pieces, threads: int) -> Preview:
+def _of_pieces(parts: Pieces, threads: int, compiled: Clock = nothing) -> Preview:
     """That of pieces, one after another, and the time they take."""
     kind, study, pieces = parts.kind, parts.study, parts.pieces
     rows = [("kind", study.kind), ("asks", kind.question), *[("pieces", str(len(pieces)))] * (len(pieces) > 1)]
-    cases, around = expand(study), AROUND * time.process_time()
+    cases, around = expand(study), AROUND * (time.process_time() - compiled())
     seen = kind.foreseen(study, threads, parts.audited)
     each = {} if seen else sampled(pieces, threads)
     if kind.sweeps:
