@@ -16,14 +16,15 @@ from studies.findings.amplification import largest, sizes
 from studies.protocol.study import kind_named, question_of
 from studies.results.axes import PACES, VARIANT, Axis
 from studies.results.findings_common import LOOSE
-from studies.results.formatting import counted, listed, number, quantity
+from studies.results.formatting import counted, listed, number, percent, quantity
 from studies.results.results import Results
 
 MOST_PARTS = 8  # of a sweep that are told one by one
 MOST_APART = 3  # of them that are told each with what else is swept
-MOST_TOLD = 3  # values of another swept number that are told one by one
+MOST_TOLD = 4  # values of another swept number that are told one by one
 GAP = 3.0  # times the usual distance of two values of a sweep
-NEARLY = 0.9  # of a limit that is exceeded nowhere: between swept values it may well be
+MOST_SHARES, FEWEST_SAMPLES = 6, 10  # values of a swept number that are told with the part of their variants
+NEARLY, CLOSE = 0.9, 0.99  # of a limit that is exceeded nowhere, or not beside: between swept values it may well be
 UNLIKE = 1e-4  # of a limit: what stays below is a limit in another unit, such as 3 for 3 um
 LIMIT = " Its absolute value exceeds "
 LIMITED = (
@@ -110,6 +111,7 @@ def told_limit(
     doubt = f"; with its estimated error perhaps {perhaps}, surely {surely}" if either != [said, said] else ""
     top = float(np.nanmax(np.where(results.with_values, values, np.nan), initial=0.0))
     near = f"; at most it is {quantity(top, units)}" if said.startswith("nowhere") and top > NEARLY * limit else ""
+    near = near or _comes_close(results, values, limit, along)
     named, opened = f"{quantity(limit, units)}{out_of_reach(limit, top)}", _told_opened(results, values > limit)
     return f"{LIMIT}{named} {said}{near}{doubt}{opened}."
 
@@ -172,6 +174,8 @@ def where_beyond(results: Results, values: Array, threshold: float, axis: Axis |
     """In which part of the sweep values (in its shape) exceed a threshold: along one swept number, for each value of
     another where these are few; without one in how many variants."""
     beyond = np.nan_to_num(np.where(results.with_values, values, np.nan)) > threshold
+    if axis is not None and VARIANT in results.dims and _has_samples(results, axis):
+        return _in_parts(results, axis, beyond)
     if axis is None or axis.dim == VARIANT:
         return f"in {counted(int(beyond.sum()), 'variant')} of {results.size:,}" if beyond.any() else "nowhere"
     others = [other for other in results.axes if other.name != axis.name]
@@ -179,9 +183,44 @@ def where_beyond(results: Results, values: Array, threshold: float, axis: Axis |
         return _along(results, axis, beyond)
     own = results.everywhere(results.dataset[others[0].name])
     told = {float(value): _along(results, axis, beyond, own == value) for value in np.unique(own)}
-    if len(set(told.values())) == 1:
-        return next(iter(told.values()))
-    return "; ".join(f"{text} ({others[0].noun} {others[0].in_words(value)})" for value, text in told.items())
+    alike = {text: [others[0].in_words(value) for value in told if told[value] == text] for text in told.values()}
+    if len(alike) == 1:
+        return next(iter(alike))
+    return "; ".join(f"{text} ({others[0].noun} {listed(values)})" for text, values in alike.items())
+
+
+def _has_samples(results: Results, axis: Axis) -> bool:
+    """Whether there are many variants at each of the few values of a swept number."""
+    few = np.unique(axis.values).size
+    return 1 < few <= MOST_SHARES and results.size >= FEWEST_SAMPLES * few
+
+
+def _in_parts(results: Results, axis: Axis, beyond: Mask) -> str:
+    """At each value of a swept number, in which part of its variants values are beyond a threshold."""
+    own, known = results.everywhere(results.dataset[axis.name]), results.with_values
+    parts = {float(value): beyond[(own == value) & known].mean() for value in np.unique(own[known])}
+    if len(set(parts.values())) == 1 and {*parts.values()} <= {0.0, 1.0}:
+        return f"{'everywhere' if beyond.any() else 'nowhere'} from {axis.span}"
+    told = [f"at {axis.in_words(value)} in {percent(part)}" for value, part in parts.items()]
+    return f"{listed(told)} of the variants"
+
+
+def _comes_close(results: Results, values: Array, limit: float, axis: Axis | None) -> str:
+    """Where along a swept number values are just below a limit, and none beside them is above it; "" nowhere."""
+    if axis is None or axis.dim == VARIANT:
+        return ""
+    line = np.moveaxis(np.where(results.with_values, values, 0.0), results.dims.index(axis.dim), 0)
+    line = line[np.argsort(axis.values)]
+    over = np.pad(line > limit, [(1, 1)] + [(0, 0)] * (line.ndim - 1))
+    close = (line > CLOSE * limit) & ~(over[:-2] | over[1:-1] | over[2:])
+    places = np.sort(axis.values)[close.reshape(len(line), -1).any(axis=1)]
+    if not places.size:
+        return ""
+    return (
+        f"; within {percent(1.0 - CLOSE)} of it, so perhaps beyond between the swept values, it comes at "
+        + listed([axis.in_words(float(place)) for place in places[:MOST_APART]])
+        + " and more" * (places.size > MOST_APART)
+    )
 
 
 def _where_alone(results: Results, values: Array, threshold: float, axis: Axis | None) -> str:

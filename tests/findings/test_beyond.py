@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from studies.findings.beyond import where_beyond
+from studies.findings.beyond import told_limit, where_beyond
 from studies.reporting import answers
 from studies.results.results import Results
 from tests.studies import scenes
@@ -95,7 +95,7 @@ def test_titles_name_the_largest_of_their_quantity() -> None:
     assert titles["largest-bending-moment"].startswith("The largest bending moment at 1 m of bed is 4 N m, at pace")
 
 
-MASSES = 'mass = { of = "carriage.table.mass", values = [50, 60, 70, 80] }'
+MASSES = 'mass = { of = "carriage.table.mass", values = [50, 60, 70, 80, 90] }'
 
 
 def beyond(*speeds: int, count: int = 20, masses: tuple[int, ...] = ()) -> str:
@@ -144,7 +144,7 @@ def part_of(values: str, exceeded: list[list[bool]]) -> str:
 
 def test_not_every_combination_is_told() -> None:
     """Each mass exceeds it at some speed, and none at all of them."""
-    none, some, full = [False] * 4, [True, True, False, False], [True] * 4
+    none, some, full = [False] * 5, [True, True, False, False, False], [True] * 5
     three = "values = [1, 2, 3]"
     assert part_of(three, [none, some, full]) == "from 2 m/s to the end of the sweep, 3 m/s (not with every mass)"
     assert part_of(three, [some, some, full]) == "everywhere from 1 m/s to 3 m/s (not with every mass)"
@@ -153,8 +153,33 @@ def test_not_every_combination_is_told() -> None:
 
 def test_values_that_grow_by_a_factor_are_no_further_apart_where_they_are_large() -> None:
     """Of a number that is left out between them it is told as before."""
-    none, full = [False] * 4, [True] * 4
+    none, full = [False] * 5, [True] * 5
     even = 'from = 1, to = 32, count = 6, spacing = "log"'
     assert part_of(even, [none, *[full] * 5]) == "from 2 m/s to the end of the sweep, 32 m/s"
     holed = "values = [1, 2, 3, 4, 11, 12]"
     assert part_of(holed, [none, *[full] * 5]) == "at 2 to 4 m/s and from 11 m/s to the end of the sweep, 12 m/s"
+
+
+def test_of_samples_the_part_of_the_variants_is_told_at_few_values_of_another_number() -> None:
+    """Not "everywhere (not with every mass)", which hides how many."""
+    pace = 'speed = { of = "carriage.table.motion.speed", values = [5, 10] }'
+    mass = 'mass = { of = "carriage.table.mass", sobol = 10, from = 50, to = 90 }'
+    results = Results.of(scenes.run("passage", f"{pace}\n{mass}"))
+    speed = next(axis for axis in results.axes if axis.name == "speed")
+    own = results.everywhere(results.dataset["speed"])
+    for beside, words in ((7, "at 5 m/s in 30 % and at 10 m/s in 0 % of the variants"), (0, "everywhere from 5 m/s")):
+        values = np.where(own == 10.0, float(beside == 0), 1.0)
+        values[(own == 5.0) & (np.cumsum(own == 5.0).reshape(own.shape) <= beside)] = 0.0
+        assert where_beyond(results, values, 0.5, speed).startswith(words)
+    assert where_beyond(results, np.zeros(results.shape), 0.5, speed).startswith("nowhere from 5 m/s")
+
+
+def test_values_just_below_a_limit_are_told_where_none_beside_is_above() -> None:
+    """An acceleration of 3.498 at 278 km/h was 3.503 at 277.5; the ends of what is exceeded say nothing new."""
+    pace = 'speed = { of = "carriage.table.motion.speed", from = "1 km/h", to = "9 km/h", count = 9 }'
+    results = Results.of(scenes.run("passage", pace))
+    values = np.array([1.0, 3.6, 3.49, 1.0, 3.49, 3.46, 1.0, 3.495, 1.0]).reshape(results.shape)
+    said = told_limit(results, values, 3.5, "m s-2")
+    assert "exceeds 3.5 m/s² at 2 km/h; within 1 % of it, so perhaps beyond between" in said
+    assert said.endswith("it comes at 5 km/h and 8 km/h.")
+    assert "within 1 %" not in told_limit(results, values, 2.0, "m s-2")
