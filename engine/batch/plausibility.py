@@ -8,7 +8,7 @@ import numpy as np
 
 from engine.accuracy.grids import SceneGrid
 from engine.batch.plan import Plan
-from engine.batch.remarks_of_carriages import ends_early, stays_level, unreached
+from engine.batch.remarks_of_carriages import ends_early, has_no_band, points_up, stays_level, unreached, vanishes
 from engine.bodies.modal.modal_body import ModalBody
 from engine.model.lane_table import moving_mass, weight
 from engine.observation.signals import build_sensors
@@ -393,4 +393,7 @@ REMARKS = (
     unreached,
     stays_level,
     ends_early,
+    vanishes,
+    points_up,
+    has_no_band,
 )

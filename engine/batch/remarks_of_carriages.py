@@ -1,5 +1,5 @@
-"""Remarks of carriages: swept limits of motions that some variants do not reach, wheels that stay level, and
-runs that end with a train."""
+"""Remarks of carriages: swept limits of motions that some variants do not reach, wheels that stay level, runs that end
+with a train, loads that vanish on their way or point up; and bands of settling that are no band."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from engine.batch.plan import Plan
 
 IN_A_ROW = 3  # axles: two excite little more than one
 RINGS = 5.0  # first periods after a train: of two spans 3.4 m/s2 were seen after one of them, 3.9 after five
+SHORT = 0.5  # of the length of the body: a way of a load that passes; cranes' are nine tenths of theirs
+WIDE = 0.1  # of the length: a band within which everything has settled
 BELOW = 1e-9  # relative: a limit that is missed by more is not reached
 
 
@@ -65,3 +67,36 @@ def ends_early(plan: Plan) -> Iterator[str]:
                 f"the run goes on for {rest} after the last axle of train {name} has left, and where axles come in "
                 f"step with the body it swings furthest about then: after = {RINGS:g} in its motion sees more of it"
             )
+
+
+def vanishes(plan: Plan) -> Iterator[str]:
+    """One sentence for every carriage that only passes and whose way ends on its body soon after it begins."""
+    for tie in plan.base.carriages:
+        motion, length = tie.rider.motion, tie.rider.length
+        start, end = (float(motion.path(tau).S) for tau in (0.0, motion.duration))
+        if motion.passes and 0.0 < end < length and abs(end - start) < SHORT * length:
+            table = plan.study.source.written(f"carriage.{tie.name}").replace(".", " ")
+            yield (
+                f"{table} is gone from {end:g} m on, where its {motion.kind} ends on a body of {length:g} m: an end at "
+                "or beyond that of the body lets it leave, other motions let it stop"
+            )
+
+
+def points_up(plan: Plan) -> Iterator[str]:
+    """One sentence for every plain force that is negative."""
+    for name, carriage in plan.study.carriage.items():
+        table = plan.study.source.written(f"carriage.{name}").replace(".", " ")
+        for key in carriage.forces:
+            if plan.study.value(f"carriage.{name}.{key}") < 0.0:
+                yield f"the force of {table} is negative, so that it lifts: weights are positive"
+
+
+def has_no_band(plan: Plan) -> Iterator[str]:
+    """One sentence for every sensor whose band of settling is as large as its body."""
+    for name, sensor in plan.study.sensor.items():
+        for part in plan.base.bodies:
+            if part.name == plan.study.body_of(name) and (sensor.settling_band or 0.0) > WIDE * part.modal.length:
+                yield (
+                    f"settling_band of sensor {name}, {sensor.settling_band:g} m, is more than a tenth of {part.name}: "
+                    "was a smaller unit meant?"
+                )

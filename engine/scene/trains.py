@@ -42,6 +42,10 @@ class Train(Spec):
     those that `load_scale` multiplies, in `units`.
     """
 
+    looked_for: ClassVar[Mapping[str, str]] = dict.fromkeys(
+        ("speed", "start", "end", "after"),
+        "this is a key of its motion: motion.speed, or the header [train.NAME.motion]",
+    )
     units: ClassVar[str] = "kg"
     loads: ClassVar[tuple[str, ...]] = ()
     springs: ClassVar[tuple[str, ...]] = ()

@@ -105,7 +105,11 @@ class KindOf:
         if "kind" not in value:
             problem = fault("the kind is missing", expected=f"one of {known}")
         else:
-            remedy = nearest(kind, list(self.table)) or _OTHER_KINDS.get(str(kind).replace("_", "-"), "")
+            word = str(kind).lower().replace("_", "-").replace(" ", "-")
+            meant = _MEANT.get(word) if _MEANT.get(word) in self.table else None
+            remedy = (
+                f'did you mean "{meant}"?' if meant else nearest(kind, list(self.table)) or _OTHER_KINDS.get(word, "")
+            )
             what = f"unknown {self.noun} kind"
             problem = fault(what, expected=f"one of {known}", received=shortened(kind), remedy=remedy)
         detail = InitErrorDetails(type=problem, loc=("kind",), input=kind)
@@ -172,6 +176,20 @@ _OTHER_KINDS = {
     **dict.fromkeys(("sprung", "sprung-mass", "spring-mass", "quarter-car", "vehicle", "car", "bogie"), SPRUNG),
 }
 
+# what others call a kind -> its name
+_MEANT = {
+    other: kind
+    for kind, others in (
+        ("beam", "euler-bernoulli bernoulli beam188 beam189 bar girder"),
+        ("frame", "timoshenko portal truss grillage"),
+        ("force", "moving-force point-load point-force load"),
+        ("mass", "moving-mass point-mass"),
+        ("point-to-point", "trapezoidal trapezoid s-curve scurve ptp"),
+        ("cruise", "constant-speed constant linear uniform"),
+    )
+    for other in others.split()
+}
+
 # what others call a number -> its key; of several the first that is there
 _SYNONYMS: dict[str, tuple[str, ...]] = {
     other: tuple(keys.split())
@@ -191,6 +209,10 @@ _SYNONYMS: dict[str, tuple[str, ...]] = {
         ("acceleration", "accel acc a deceleration decel amax"),
         ("gravity", "g"),
         ("at", "x position place"),
+        ("displacement", "deflection deflexion sag"),
+        ("spacing", "positions distances axle_distances"),
+        ("from", "start"),
+        ("to", "stop end"),
     )
     for other in others.split()
 }

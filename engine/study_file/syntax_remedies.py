@@ -9,11 +9,13 @@ _NUMBER = r"[+-]?\d+(?:\.\d*)?(?:[eE][+-]?\d+)?"
 _LINES = "TOML has lines key = value below headers such as [body.bed]"
 _NOT_JSON = f"this looks like JSON or Python; {_LINES}"
 _QUOTED = "quotation marks around a number with a unit"
+_QUOTED_WORD = 'quotation marks around a word: "{0}"'
 _MISSING_QUOTE = "a quotation mark is missing"
 _OPEN_QUOTE = re.compile(r"^[^'#\"]*'[^']*$")
 _CALCULATES = "write the result: a study file does not calculate"
 _OPEN_LIST = "a ] is missing: a list ends with it"
 _OPEN_TABLE = "what begins with {{ ends with }} in the same line"
+_LONG_TABLE = _OPEN_TABLE + "; a longer table has a header of its own, such as [carriage.NAME.motion]"
 _ENTRY = r"""(?:[{"']|[+-]?\.?\d|\[(?![\w.-]+\]\s*(?:#|$))).*"""
 _KEY = r"[\w.-]+\s*="
 
@@ -35,6 +37,7 @@ _AT_PLACE = tuple(
         ("Unclosed inline table", r"", r"(?:#.*|\].*)?$", _OPEN_TABLE),
         ("Invalid initial character", r"[{,]\s*$", r"\}", "no comma before the }}"),
         ("Invalid initial character", r"=.*,\s*$", r"(?:#.*)?$", _OPEN_TABLE),
+        ("Invalid initial character", r"=\s*\{\s*$", r"(?:#.*)?$", _LONG_TABLE),
         ("Expected '=' after", r"[{,]\s*[\w.\"'-]+\s*$", r":", "= instead of the colon"),
         ("Expected '=' after", r"^[^\[]*$", r"\]\s*$", "a [ is missing before the header"),
         ("Expected '=' after", r"^[\w ]+$", r"[\w ]+=", "a key without spaces, such as second_moment"),
@@ -50,7 +53,13 @@ _AT_PLACE = tuple(
         ("Expected newline", rf"=\s*{_NUMBER}\s+$", r"[^\W\d]\S*\s+\S", "a comment begins with #"),
         ("Invalid value", r"", r"[+-]?\.\d", "a digit before the decimal point: 0."),
         ("Invalid value", r"", r"\(", "a list stands in square brackets: [1, 2]"),
-        ("Invalid value", r"", r"(?!True|False)([^\W\d][\w.-]*)\s*[,\]}]", 'quotation marks around a word: "{0}"'),
+        ("Invalid value", r"", r"(?!True|False)([^\W\d][\w.-]*)\s*[,\]}]", _QUOTED_WORD),
+        (
+            "Invalid value",
+            r"=\s*$",
+            r"(?!True|False)([^\W\d][\w-]*)\s*(?:#.*)?$",
+            'quotation marks around a word: "{0}"',
+        ),
         ("Invalid value", r"", r",", "a value before this comma"),
         ("Duplicate inline table key", r"", r"", "this key stands twice between the same braces: keep one of the two"),
         ("Unescaped", r"", r"", r"straight single quotation marks around text with \: 'C:\data'"),

@@ -20,6 +20,7 @@ from engine.study_file.checks import NO_JERK, NOT_MEANT, SIZES, is_meant
 from results_schema.errors import shortened
 
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*")
+THOUSANDS = 3  # digits behind a comma that may be none of decimals
 _COMMA = re.compile(r",(\d+)(.*)")
 _FACTOR = re.compile(r"([A-Za-zµμ°%]+)(?:(?:\*\*|\^)?([+-]?\d)|([²³⁴]))?|1(?=\s*/)")
 _OPERATOR = re.compile(r"\s*([*·/])\s*|\s+")
@@ -137,8 +138,12 @@ def _split(text: str, wanted: Unit) -> tuple[str, str]:
     """Number and unit of a string; a bare number in quotes is refused, as is an expression."""
     match = _QUANTITY.fullmatch(text) if len(text) <= 100 else None
     if match is not None and (decimals := _COMMA.match(match[2])):
-        remedy = f'a point: "{match[1].replace(".", "")}.{decimals[1]}{decimals[2]}"'
-        raise fault("a decimal comma", expected=wanted.article, received=shortened(text), remedy=remedy)
+        whole, thousands = match[1].replace(".", ""), len(decimals[1]) == THOUSANDS
+        remedy = f'a point: "{whole}.{decimals[1]}{decimals[2]}"'
+        if thousands:
+            remedy = f'"{whole}{decimals[1]}{decimals[2]}" if it parts thousands, else {remedy}'
+        what = "a comma in a number" if thousands else "a decimal comma"
+        raise fault(what, expected=wanted.article, received=shortened(text), remedy=remedy)
     example = f'a number, or a string such as "1.5 {wanted.typed or "%"}"'
     if match is None:
         stiff = f'a number large against what it supports, such as "1e12 {wanted.typed}", or a frame with a held node'

@@ -101,7 +101,8 @@ def _as_archive_error(path: Path) -> Iterator[None]:
 
 def _check_signature(path: Path) -> None:
     if not path.exists():
-        raise BadInput("no such file", where=str(path))
+        near = path.with_name(f"{path.name}.nc")
+        raise BadInput("no such file", where=str(path), remedy=f'did you mean "{near}"?' if near.exists() else "")
     if not path.is_file():
         raise BadInput("not a file", where=str(path), expected="an archive (.nc)")
     try:

@@ -239,6 +239,18 @@ KINDS: Pieces[Kind] = Pieces(
     missing=lambda kind: no_row_of(Kind)(kind) or lacks(*KIND_HAS)(kind),
 )
 
+#: What others call a kind of study.
+MEANT = {
+    other: kind
+    for kind, others in (
+        ("passage", "moving-load moving-loads moving-mass crossing"),
+        ("eigenfrequencies", "modal modes eigen frequencies"),
+        ("trajectory", "transient dynamic time-history"),
+        ("influence", "static statics"),
+    )
+    for other in others.split()
+}
+
 
 def kind_names() -> tuple[str, ...]:
     """The kinds of study that there are."""
@@ -249,7 +261,7 @@ def kind_named(name: str, where: str = "kind") -> Kind:
     """The kind of that name; its results are declared from then on. Raises BadInput for an unknown one."""
     if name not in KINDS:
         known = kind_names()
-        near = get_close_matches(name, known, n=1)
+        near = [MEANT[name]] if name in MEANT else get_close_matches(name, known, n=1)
         remedy = f'did you mean "{near[0]}"?' if near else ABSENT
         expected = f"one of {', '.join(known)}"
         raise BadInput("unknown kind of study", where=where, expected=expected, received=repr(name), remedy=remedy)

@@ -101,6 +101,13 @@ CASES = {
     "the run goes on for 1 first period of the body after the last axle of train tram has left": in_a_row(3, 1.0),
     "does not pitch, as contacts of it hold it at one place of its track: rear and front stay level": on_wheels(),
     "does not act along or across its track: if it did (carriage.car.inertia_along = true": on_portal(),
+    "carriage car is gone from 0.3 m on, where its cruise ends on a body of 1 m": passing(
+        car=mass(0.1, cruise(0.0, 0.3, 0.5))
+    ),
+    "the force of carriage car is negative, so that it lifts: weights are positive": passing(car=force(-0.1, WAY)),
+    "settling_band of sensor place, 20 m, is more than a tenth of bed: was a smaller unit meant?": passing(
+        car=mass(0.1, STOP), output={"residual": True}, sensor={"place": fixed(0.4) | {"settling_band": 20.0}}
+    ),
 }
 
 
@@ -118,6 +125,7 @@ def test_an_ordinary_study_is_not_remarked() -> None:
     both = on_portal(inertia_along=True, inertia_across=True)
     assert remarks(make_plan(both)) == []
     assert remarks(make_plan(on_wheels(at=0.2))) == []
+    assert remarks(make_plan(passing(car=mass(0.1, cruise(0.0, 0.9, 0.5))))) == []
 
 
 @pytest.mark.parametrize("direction", [None, "x"])

@@ -91,9 +91,26 @@ MISTAKES = {
         SMALL.replace('kind = "cruise"', 'kind = "ramp"'), 2, ["unknown motion kind", "is the package installed"],
     ),
     "a decimal comma in quotes": (SMALL.replace("length = 1.0", 'length = "2,5 m"'), 2, ["decimal comma", '"2.5 m"']),
+    "a comma that may part thousands": (
+        SMALL.replace("density = 1000.0", 'density = "7,850 kg/m3"'),
+        2, ["density: a comma", '"7850 kg/m3" if it parts thousands, else a point: "7.850 kg/m3"'],
+    ),
     "a decimal comma": (SMALL.replace("length = 1.0", "length = 2,5"), 2, ["line 7", "decimal point: 2.5"]),
     "a thousands comma": (SMALL.replace("density = 1000.0", "density = 7,850"), 2, ["7850"]),
     "a unit without quotes": (SMALL.replace("length = 1.0", "length = 2.5 m"), 2, ["line 7", '"2.5 m"']),
+    "ends by another name": (SMALL.replace("pinned-pinned", "fixed-hinged"), 2, ['did you mean "clamped-pinned"']),
+    "a word without quotes": (
+        SMALL.replace('"pinned-pinned"', "pinned-pinned"), 2, ['quotation marks around a word: "pinned-pinned"'],
+    ),
+    "a beam of another program": (SMALL.replace('kind = "beam"', 'kind = "BEAM188"'), 2, ['did you mean "beam"']),
+    "a motion of a drive": (SMALL.replace('kind = "cruise"', 'kind = "s-curve"'), 2, ['mean "point-to-point"']),
+    "a question by another name": (SMALL.replace('"passage"', '"moving-load"'), 2, ['did you mean "passage"']),
+    "E I alone": (SMALL.replace("second_moment = 1e-6", "EI = 1e3"), 2, ["write second_moment = 1, youngs_modulus"]),
+    "ends of an axis": (axis('m = { of = "gravity", start = 1, to = 2, count = 2 }'), 2, ['did you mean "from"']),
+    "a limit of deflection": (f"{SMALL}\n[question]\ndeflection = 0.1\n", 2, ['did you mean "displacement"']),
+    "braces over lines": (
+        SMALL.replace('motion = { kind = "cruise", ', 'motion = {\nkind = "cruise", '), 2, ["[carriage.NAME.motion]"],
+    ),
     "Gpa": (SMALL.replace("= 1e9", '= "210 Gpa"'), 2, ['did you mean "GPa"']),
     "newtons per micron": (
         SMALL.replace('supports = "pinned-pinned"', 'supports = [{ at = 0.1, stiffness = "400 N/mu" }]'),

@@ -47,15 +47,12 @@ class Spring(Spec):
 
 
 _ENDS = tuple("-".join(ends) for ends in product(END_WORDS, repeat=2))
+_OTHERS = {"fixed": "clamped", "built-in": "clamped", "hinged": "pinned", "simple": "pinned", "simply": "pinned"}
+_WORDS = _OTHERS | {word: word for word in END_WORDS}  # words for ends that others use, and ours
 _MEANT = {
-    "pinned": "pinned-pinned",
-    "clamped": "clamped-clamped",
-    "free": "free-free",
-    "fixed": "clamped-clamped",
-    "hinged": "pinned-pinned",
+    **{word: f"{end}-{end}" for word, end in _WORDS.items()},
+    **{"-".join(words): "-".join(_WORDS[word] for word in words) for words in product(_WORDS, repeat=2)},
     "simply-supported": "pinned-pinned",
-    "hinged-hinged": "pinned-pinned",
-    "fixed-fixed": "clamped-clamped",
     "cantilever": "clamped-free",
 }
 Ends = Annotated[str, AfterValidator(one_of(*_ENDS, meant=_MEANT))]
@@ -73,6 +70,11 @@ class Beam(Body):
     >>> bed.bending_stiffness, bed.mass, bed.ends
     (1749300.0, 1177.5, ('pinned', 'pinned'))
     """
+
+    looked_for: ClassVar[Mapping[str, str]] = dict.fromkeys(
+        ("EI", "bending_stiffness", "mass_per_metre", "mass_per_length", "linear_density", "mu"),
+        "for E I and kg/m alone write second_moment = 1, youngs_modulus = E I, area = 1, density = the mass per metre",
+    )
 
     kind: Literal["beam"]
     length: Length = Field(gt=0)
