@@ -155,6 +155,7 @@ Paths = Annotated[
 
 
 DRAWN = "sobol = N draws N values between from and to"
+OWN_DRAWS = f"{DRAWN}; draws of your own are values = [...], of several numbers with zip = true (docs/python.md)"
 
 
 class SweepAxis(Spec):
@@ -165,6 +166,7 @@ class SweepAxis(Spec):
 
     looked_for: ClassVar[Mapping[str, str]] = {
         **dict.fromkeys(("random", "samples", "sample", "draws", "lhs", "monte_carlo"), DRAWN),
+        **dict.fromkeys(("distribution", "normal", "lognormal", "mean", "std", "sigma", "seed"), OWN_DRAWS),
         **dict.fromkeys(("n", "num", "number", "points", "steps", "step"), "count = N: values between from and to"),
     }
 

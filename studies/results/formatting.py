@@ -98,11 +98,13 @@ def quantity(value: float, units: str, digits: int = 3, beside: float = 0.0) -> 
 
     >>> quantity(0.0012345, "m"), quantity(5.0, "m s-1"), quantity(0.25, "1"), quantity(-2e-13, "N m", beside=7.0)
     ('1.23 mm', '5 m/s', '0.25', '0 N m')
+    >>> quantity(float("nan"), "m")
+    'none'
     """
     value = 0.0 if abs(value) < NOISE * abs(beside) else value
     scale = scale_for(abs(value), units)
     text = number(value * scale.factor, digits)
-    return f"{text} {scale.unit}" if scale.unit else text
+    return f"{text} {scale.unit}" if scale.unit and math.isfinite(value) else text
 
 
 def times(ratio: float, of: str = "", digits: int = 3) -> str:
