@@ -11,6 +11,7 @@ from engine.scene.carriages import Carriage
 from engine.scene.frames import GROUND
 from engine.scene.robots import check_robots
 from engine.scene.sensors import Sensor, quantities_of_a_body
+from engine.scene.trains import axle_name
 from engine.study_file.spec import nearest
 from results_schema.errors import BadInput, shortened
 from results_schema.quantities import QUANTITIES
@@ -162,6 +163,8 @@ def _must_exist(study: Study, key: str, name: str, table: Literal["body", "carri
         near = next((other for other in names if remedy == f'did you mean "{other}"?'), None)
         if near is not None and not _mentions(study.data, near):  # nothing speaks for that spelling
             remedy = f'did you mean "{near}", or should [{table}.{near}] be [{table}.{name}]?'
+        if table == "carriage" and name in study.train:
+            remedy = f'one of its axles: "{axle_name(name, 0)}" is in front'
         raise study.source.fault(key, f"no such {table}", expected=expected, received=received, remedy=remedy)
 
 

@@ -91,6 +91,18 @@ MISTAKES = {
         SMALL.replace('kind = "cruise"', 'kind = "ramp"'), 2, ["unknown motion kind", "is the package installed"],
     ),
     "a decimal comma in quotes": (SMALL.replace("length = 1.0", 'length = "2,5 m"'), 2, ["decimal comma", '"2.5 m"']),
+    "a sensor under a train": (
+        SMALL[: SMALL.index("[carriage.trolley]")]
+        + '[train.ice]\nkind = "force"\non = "beam"\nforce = 1.0\naxles = 3\nspacing = 0.1\n'
+        + 'motion = { kind = "cruise", start = 0.0, end = 1.0, speed = 5.0 }\n[sensor.under]\nunder = "ice"\n',
+        2, ["sensor.under.under: no such carriage", 'one of its axles: "ice_1" is in front'],
+    ),
+    "a key of a train's motion": (
+        SMALL[: SMALL.index("[carriage.trolley]")]
+        + '[train.ice]\nkind = "force"\non = "beam"\nforce = 1.0\naxles = 3\nspacing = 0.1\nspeed = 5.0\n'
+        + 'motion = { kind = "cruise", start = 0.0, end = 1.0 }\n[sensor.middle]\nbody = "beam"\nat = 0.5\n',
+        2, ["a key of its motion: motion.speed"],
+    ),
     "a comma that may part thousands": (
         SMALL.replace("density = 1000.0", 'density = "7,850 kg/m3"'),
         2, ["density: a comma", '"7850 kg/m3" if it parts thousands, else a point: "7.850 kg/m3"'],
