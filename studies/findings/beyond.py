@@ -299,7 +299,7 @@ def _common(results: Results, along: Axis, which: Mask) -> str:
     swept = {axis.name: results.everywhere(results.dataset[axis.name]) for axis in (along, *others)}
     own = {name: np.unique(values[which]) for name, values in swept.items()}
     told = [
-        f"{axis.noun} {replace(axis, values=own[axis.name]).span}"
+        f"{axis.noun} {_spans(axis, own[axis.name])}"
         for axis in others
         if own[axis.name].size < np.unique(axis.values).size
     ]
@@ -308,3 +308,10 @@ def _common(results: Results, along: Axis, which: Mask) -> str:
     if told:
         return f" ({', '.join(told)}{'' if full else ', not throughout'})"
     return "" if full else f" (not with every {listed([axis.noun for axis in others])})"
+
+
+def _spans(axis: Axis, own: Array) -> str:
+    """Some ascending values of a swept number: from the first to the last, but for one or two that lie between."""
+    places = np.searchsorted(np.unique(axis.values), own)
+    parts = np.split(own, np.flatnonzero(np.diff(places) > 1) + 1)
+    return _in_one_unit(axis, parts) if 1 < len(parts) <= MOST_APART else replace(axis, values=own).span

@@ -92,7 +92,9 @@ class Asymmetry(Kind):
         if carriage.motion.legs is None:
             here = f"carriage.{name}.motion.kind"
             what = "forward and backward are compared between the turns, on a way that comes back at constant speed"
-            remedy = 'kind = "double-peak" asks what a cycle of it does' if carriage.motion.period is not None else ""
+            remedy = "two passages, one with start and end exchanged, and compare of their archives"
+            if carriage.motion.period is not None:
+                remedy = 'kind = "double-peak" asks what a cycle of it does'
             received = f'"{study.value(here)}"'
             raise study.source.fault(here, what, expected='"out-and-back"', received=received, remedy=remedy)
         _check_cruise(study, name)

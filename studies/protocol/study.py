@@ -278,7 +278,11 @@ def kind_of(study: Study) -> Kind:
     if study.robot and not kind.moves_robots:
         what = f"no robots move in studies of the kind {study.kind}"
         raise study.source.fault("robot", what, expected='kind = "portal"')
-    kind.check_tables(study)
+    try:
+        kind.check_tables(study)
+    except BadInput:
+        kind.check(study)  # whether its motions suit the question at all is said first
+        raise
     kind.check(study)
     return kind
 

@@ -183,3 +183,11 @@ def test_values_just_below_a_limit_are_told_where_none_beside_is_above() -> None
     assert "exceeds 3.5 m/s² at 2 km/h; within 1 % of it, so perhaps beyond between" in said
     assert said.endswith("it comes at 5 km/h and 8 km/h.")
     assert "within 1 %" not in told_limit(results, values, 2.0, "m s-2")
+
+
+def test_what_lies_between_others_and_is_not_among_them_is_left_out() -> None:
+    """Of masses 50 to 90 kg that all but 60 kg exceed a limit."""
+    three, some = "values = [1, 2, 3]", [True, False, True, True, True]
+    assert part_of(three, [[False] * 5, some, some]) == (
+        "from 2 m/s to the end of the sweep, 3 m/s (mass 50 and 70 to 90 kg)"
+    )

@@ -54,6 +54,12 @@ SPEED_READ = '[sensor.table_speed]\nbody = "bed"\nat = 3.0'
     ("given", "changes", "extra", "words"),
     [
         ("passage", {"kind": "asymmetry"}, "", r'table.motion.kind: .*comes back.*"out-and-back".*"cruise"'),
+        (  # before what else does not suit it
+            "passage",
+            {"kind": "asymmetry"},
+            "[question]\namplification = 1.5",
+            r"table.motion.kind: .*comes back.*two passages, one with start and end exchanged, and compare",
+        ),
         (
             "double-peak",
             {"kind": "asymmetry"},
