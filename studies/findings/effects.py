@@ -9,10 +9,11 @@ import numpy as np
 from results_schema.arrays import Array
 from results_schema.lazy_imports import xr
 from studies.results.axes import VARIANT, Axis
-from studies.results.formatting import ALIKE, listed, number, percent
+from studies.results.formatting import ALIKE, listed, number, percent, quantity
 from studies.results.results import Results
 
 MOST_AXES = 4
+MOST_EACH = 4  # values of a swept number for each of which the largest is told
 HARDLY = 0.005  # of the smallest value: what no figure shows
 TIMES = 1.5  # the largest over the smallest from which on it is told how many times, else by how many percent
 HALVED = 2.0  # the same of what falls
@@ -66,6 +67,25 @@ def told_effects(results: Results, values: Array, what: str, error: Array | floa
     lines = {axis: _worst(results, axis, known, doubt) for axis in axes}
     told = [_effect(axis, *line) for axis, line in lines.items() if (line[0] > 0.0).all()]
     return f"Over all else that is swept, {what} {listed(told)}." if told else ""
+
+
+def told_for_each(results: Results, values: Array, units: str) -> str:
+    """Of values over two swept numbers the largest for each of the few values of one, and where in the other it is: a
+    sentence behind another; "" elsewhere, and where one is the same for all."""
+    axes = sorted((axis for axis in results.axes if len(axis.values) > 1), key=lambda axis: len(axis.values))
+    if VARIANT in results.dims or len(axes) != 2 or not len(axes[0].values) <= MOST_EACH < len(axes[1].values):
+        return ""
+    few, other = axes
+    known = np.where(results.with_values & np.isfinite(values), values, -np.inf)
+    lines = np.moveaxis(known, results.dims.index(few.dim), 0)
+    told = [
+        f"{quantity(float(line.max()), units)} at {other.in_words(float(other.values[np.argmax(line)]))} "
+        f"({few.in_words(float(value))})"
+        for value, line in sorted(zip(few.values, lines, strict=True), key=lambda pair: pair[0])
+        if np.isfinite(line.max())
+    ]
+    tops = {part.partition(" at ")[0] for part in told}
+    return f" For each {few.noun} it is largest with {listed(told)}." if len(tops) > 1 else ""
 
 
 def _worst(results: Results, axis: Axis, values: Array, error: Array) -> tuple[Array, Array]:

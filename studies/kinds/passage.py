@@ -31,7 +31,7 @@ from studies.findings.beyond import (
     where_beyond,
 )
 from studies.findings.contacts import told_contacts, told_uplift
-from studies.findings.effects import by_effect, hardly_changed, told_effects, unchanged
+from studies.findings.effects import by_effect, hardly_changed, told_effects, told_for_each, unchanged
 from studies.findings.envelopes import beyond_sensors, sizes_along, told_along
 from studies.findings.in_step import told_between_speeds
 from studies.findings.residual import check_residual, most_ringing, residuals
@@ -157,6 +157,7 @@ def _largest(results: Results, sensor: str) -> str:
 def _effects(results: Results, envelopes: list[str], sensors: list[str]) -> str:
     """What every swept number does to what the answer begins with, where there are several; "" else."""
     error: Array | float = 0.0
+    each = ""
     if envelopes:
         name = envelopes[0]
         what, values = (
@@ -168,8 +169,9 @@ def _effects(results: Results, envelopes: list[str], sensors: list[str]) -> str:
         error = errors_of_size(results, sensors[0])
         if hardly_changed(results, values, partial(quantity, units=results.sensors[sensors[0]])):
             return ""
+        each = told_for_each(results, values, results.sensors[sensors[0]])
     said = told_effects(results, values, f"the largest {what}", error)
-    return f" {said}" if said else ""
+    return f" {said}{each}" if said else ""
 
 
 def _amplified(results: Results, sensor: str) -> str:
