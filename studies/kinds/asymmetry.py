@@ -86,17 +86,14 @@ class Asymmetry(Kind):
     settings = Asked
     drawn_by = "studies.pictures.asymmetry"
 
+    def check_tables(self, study: Study) -> None:
+        """That its first carriage comes back, before what the question asks of that."""
+        _check_comes_back(study)
+        super().check_tables(study)
+
     def check(self, study: Study) -> None:
         """First carriage out and back, cruising over at least half of its stroke; sensors with a static response."""
-        name, carriage = first_carriage(study)
-        if carriage.motion.legs is None:
-            here = f"carriage.{name}.motion.kind"
-            what = "forward and backward are compared between the turns, on a way that comes back at constant speed"
-            remedy = "two passages, one with start and end exchanged, and compare of their archives"
-            if carriage.motion.period is not None:
-                remedy = 'kind = "double-peak" asks what a cycle of it does'
-            received = f'"{study.value(here)}"'
-            raise study.source.fault(here, what, expected='"out-and-back"', received=received, remedy=remedy)
+        name, _ = first_carriage(study)
         _check_cruise(study, name)
         if not study.sensor:
             raise study.source.fault("sensor", "nothing is measured", expected="at least one sensor")
@@ -128,6 +125,18 @@ class Asymmetry(Kind):
 
 
 KIND = Asymmetry()
+
+
+def _check_comes_back(study: Study) -> None:
+    name, carriage = first_carriage(study)
+    if carriage.motion.legs is None:
+        here = f"carriage.{name}.motion.kind"
+        what = "forward and backward are compared between the turns, on a way that comes back at constant speed"
+        remedy = "two passages, one with start and end exchanged, and compare of their archives"
+        if carriage.motion.period is not None:
+            remedy = 'kind = "double-peak" asks what a cycle of it does'
+        received = f'"{study.value(here)}"'
+        raise study.source.fault(here, what, expected='"out-and-back"', received=received, remedy=remedy)
 
 
 def _check_cruise(study: Study, carriage: str) -> None:

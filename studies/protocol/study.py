@@ -278,11 +278,7 @@ def kind_of(study: Study) -> Kind:
     if study.robot and not kind.moves_robots:
         what = f"no robots move in studies of the kind {study.kind}"
         raise study.source.fault("robot", what, expected='kind = "portal"')
-    try:
-        kind.check_tables(study)
-    except BadInput:
-        kind.check(study)  # whether its motions suit the question at all is said first
-        raise
+    kind.check_tables(study)
     kind.check(study)
     return kind
 
