@@ -15,6 +15,15 @@ T = TypeVar("T")
 ABSENT = "is the package installed that brings it?"
 
 
+def by_other_names(*rows: tuple[str, str]) -> dict[str, str]:
+    """What others call something -> what it is called here, from rows of the latter and the words of others.
+
+    >>> by_other_names(("beam", "girder bar"))
+    {'girder': 'beam', 'bar': 'beam'}
+    """
+    return {other: own for own, others in rows for other in others.split()}
+
+
 @dataclass(frozen=True, eq=False)
 class Pieces(Mapping[str, T], Generic[T]):
     """Pieces of one sort by name; those of other packages are imported when they are first asked for.

@@ -17,38 +17,39 @@ def log(words: str) -> None:
 
 @contextmanager
 def told_of_compiling(tell: Callable[[str], object] = log) -> Iterator[Callable[[], float]]:
-    """Tell once if a kernel is compiled meanwhile, as the cache on the disk does not hold it. Yields what says for how
-    many seconds kernels have been compiled so far."""
+    """Tell once if a kernel is compiled meanwhile, as the cache on the disk does not hold it; yields the seconds, as of
+    `seconds_of_compiling`."""
     from numba.core import event
 
-    class Compiling(event.Listener):
-        """Tells of the first one; kernels compile those that they call."""
+    class First(event.Listener):
+        """Tells of the first one."""
 
-        told, depth, begun, seconds = False, 0, 0.0, 0.0
+        told = False
 
         def on_start(self, _: object) -> None:
             if not self.told:
                 self.told = True
                 tell(WORDS)
-            if self.depth == 0:
-                self.begun = time.perf_counter()
-            self.depth += 1
 
         def on_end(self, _: object) -> None:
-            self.depth -= 1
-            if self.depth == 0:
-                self.seconds += time.perf_counter() - self.begun
+            """Nothing to say."""
 
-    listener = Compiling()
-    with event.install_listener("numba:compile", listener):
-        yield lambda: listener.seconds
+    with event.install_listener("numba:compile", First()), seconds_of_compiling() as seconds:
+        yield seconds
+
+
+@contextmanager
+def seconds_of_compiling() -> Iterator[Callable[[], float]]:
+    """What tells for how many seconds kernels have been compiled meanwhile."""
+    from numba.core import event
+
+    compiling = event.TimingListener()
+    with event.install_listener("numba:compile", compiling):
+        yield lambda: compiling.duration if compiling.done else 0.0
 
 
 @contextmanager
 def clock_without_compiling() -> Iterator[Callable[[], float]]:
     """A clock, s, that stands still while kernels are compiled."""
-    from numba.core import event
-
-    compiling = event.TimingListener()
-    with event.install_listener("numba:compile", compiling):
-        yield lambda: time.perf_counter() - (compiling.duration if compiling.done else 0.0)
+    with seconds_of_compiling() as seconds:
+        yield lambda: time.perf_counter() - seconds()

@@ -42,10 +42,10 @@ class Train(Spec):
     those that `load_scale` multiplies, in `units`.
     """
 
-    looked_for: ClassVar[Mapping[str, str]] = dict.fromkeys(
-        ("speed", "start", "end", "after"),
-        "this is a key of its motion: motion.speed, or the header [train.NAME.motion]",
-    )
+    looked_for: ClassVar[Mapping[str, str]] = {
+        key: f"this is a key of its motion: motion.{key}, or {key} below the header [train.NAME.motion]"
+        for key in ("speed", "start", "end", "after")
+    }
     units: ClassVar[str] = "kg"
     loads: ClassVar[tuple[str, ...]] = ()
     springs: ClassVar[tuple[str, ...]] = ()

@@ -25,7 +25,7 @@ from pydantic_core import CoreSchema, InitErrorDetails, core_schema
 from engine.study_file.document import Beside
 from engine.study_file.units import fault
 from results_schema.errors import shortened
-from results_schema.registry import ABSENT, Pieces, unfinished
+from results_schema.registry import ABSENT, Pieces, by_other_names, unfinished
 
 NUMBER, WORD, LIST, TABLE = "<number>", "<word>", "<list>", "<table>"
 
@@ -106,10 +106,8 @@ class KindOf:
             problem = fault("the kind is missing", expected=f"one of {known}")
         else:
             word = str(kind).lower().replace("_", "-").replace(" ", "-")
-            meant = _MEANT.get(word) if _MEANT.get(word) in self.table else None
-            remedy = (
-                f'did you mean "{meant}"?' if meant else nearest(kind, list(self.table)) or _OTHER_KINDS.get(word, "")
-            )
+            meant = f'did you mean "{_MEANT[word]}"?' if _MEANT.get(word) in self.table else ""
+            remedy = meant or nearest(kind, list(self.table)) or _OTHER_KINDS.get(word, "")
             what = f"unknown {self.noun} kind"
             problem = fault(what, expected=f"one of {known}", received=shortened(kind), remedy=remedy)
         detail = InitErrorDetails(type=problem, loc=("kind",), input=kind)
@@ -177,45 +175,37 @@ _OTHER_KINDS = {
 }
 
 # what others call a kind -> its name
-_MEANT = {
-    other: kind
-    for kind, others in (
-        ("beam", "euler-bernoulli bernoulli beam188 beam189 bar girder"),
-        ("frame", "timoshenko portal truss grillage"),
-        ("force", "moving-force point-load point-force load"),
-        ("mass", "moving-mass point-mass"),
-        ("point-to-point", "trapezoidal trapezoid s-curve scurve ptp"),
-        ("cruise", "constant-speed constant linear uniform"),
-    )
-    for other in others.split()
-}
+_MEANT = by_other_names(
+    ("beam", "euler-bernoulli bernoulli beam188 beam189 bar girder"),
+    ("frame", "timoshenko portal truss grillage"),
+    ("force", "moving-force point-load point-force load"),
+    ("mass", "moving-mass point-mass"),
+    ("point-to-point", "trapezoidal trapezoid s-curve scurve ptp"),
+    ("cruise", "constant-speed constant linear uniform"),
+)
 
 # what others call a number -> its key; of several the first that is there
-_SYNONYMS: dict[str, tuple[str, ...]] = {
-    other: tuple(keys.split())
-    for keys, others in (
-        ("force mass", "axle_load axle_weight load weight P F"),
-        ("mass", "m sprung_mass body_mass"),
-        ("wheel_mass", "unsprung_mass unsprung axle_mass"),
-        ("youngs_modulus", "E elastic_modulus young_modulus young youngs modulus"),
-        ("second_moment", "I Iy Iyy Iz inertia moment_of_inertia second_moment_of_area"),
-        ("density", "rho"),
-        ("area", "A cross_section"),
-        ("length", "L span"),
-        ("damping_ratio", "damping zeta xi"),
-        ("damping", "c"),
-        ("stiffness", "k spring_stiffness"),
-        ("speed", "v V velocity max_speed vmax"),
-        ("acceleration", "accel acc a deceleration decel amax"),
-        ("gravity", "g"),
-        ("at", "x position place"),
-        ("displacement", "deflection deflexion sag"),
-        ("spacing", "positions distances axle_distances"),
-        ("from", "start"),
-        ("to", "stop end"),
-    )
-    for other in others.split()
-}
+_SYNONYMS = by_other_names(
+    ("force mass", "axle_load axle_weight load weight P F"),
+    ("mass", "m sprung_mass body_mass"),
+    ("wheel_mass", "unsprung_mass unsprung axle_mass"),
+    ("youngs_modulus", "E elastic_modulus young_modulus young youngs modulus"),
+    ("second_moment", "I Iy Iyy Iz inertia moment_of_inertia second_moment_of_area"),
+    ("density", "rho"),
+    ("area", "A cross_section"),
+    ("length", "L span"),
+    ("damping_ratio", "damping zeta xi"),
+    ("damping", "c"),
+    ("stiffness", "k spring_stiffness"),
+    ("speed", "v V velocity max_speed vmax"),
+    ("acceleration", "accel acc a deceleration decel amax"),
+    ("gravity", "g"),
+    ("at", "x position place"),
+    ("displacement", "deflection deflexion sag"),
+    ("spacing", "positions distances axle_distances"),
+    ("from", "start"),
+    ("to", "stop end"),
+)
 
 
 def synonym(word: object, names: Sequence[str]) -> str:
@@ -225,7 +215,7 @@ def synonym(word: object, names: Sequence[str]) -> str:
     'did you mean "body.bed.youngs_modulus"?'
     """
     table, dot, last = str(word)[:100].rpartition(".")
-    meant = _SYNONYMS.get(last) or (_SYNONYMS.get(last.lower(), ()) if len(last) > 1 else ())
+    meant = (_SYNONYMS.get(last) or (_SYNONYMS.get(last.lower(), "") if len(last) > 1 else "")).split()
     return next((f'did you mean "{table}{dot}{key}"?' for key in meant if f"{table}{dot}{key}" in names), "")
 
 

@@ -54,12 +54,7 @@ _AT_PLACE = tuple(
         ("Invalid value", r"", r"[+-]?\.\d", "a digit before the decimal point: 0."),
         ("Invalid value", r"", r"\(", "a list stands in square brackets: [1, 2]"),
         ("Invalid value", r"", r"(?!True|False)([^\W\d][\w.-]*)\s*[,\]}]", _QUOTED_WORD),
-        (
-            "Invalid value",
-            r"=\s*$",
-            r"(?!True|False)([^\W\d][\w-]*)\s*(?:#.*)?$",
-            'quotation marks around a word: "{0}"',
-        ),
+        ("Invalid value", r"=\s*$", r"(?!True|False)([^\W\d][\w-]*)\s*(?:#.*)?$", _QUOTED_WORD),
         ("Invalid value", r"", r",", "a value before this comma"),
         ("Duplicate inline table key", r"", r"", "this key stands twice between the same braces: keep one of the two"),
         ("Unescaped", r"", r"", r"straight single quotation marks around text with \: 'C:\data'"),

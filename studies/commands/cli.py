@@ -74,7 +74,7 @@ def check(study: str) -> None:
     path = catalogue.find_study(study)
     loaded = engine.load(path)
     with told_of_compiling(partial(console.say_compiling, path.stem)) as compiled:
-        seen = preview(kind_of(loaded).parts(loaded), cores(), compiled)
+        seen = preview(kind_of(loaded).parts(loaded), cores(), compiled())
     screens.show_preview(seen)
 
 

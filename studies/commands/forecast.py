@@ -13,6 +13,7 @@ from engine.accuracy.jobs import Job
 from engine.batch.execution import warm_up
 from engine.batch.executors import Place, Shared, in_processes, place
 from engine.batch.plan import NOBODY, Plan
+from engine.kernels.compiling import clock_without_compiling
 from engine.linear_algebra import one_thread
 from engine.march.stepper import Halted
 from results_schema.arrays import Counts
@@ -25,7 +26,7 @@ SECONDS = 3.0  # that measuring may take
 PATIENCE = 10.0  # the same until some variants have converged: of a run of minutes nothing is known before
 ROUNDS = (16, 64, PILOTS)  # pilots, as long as the next round is expected to end in time
 FIRST = 4  # pilots before these, where there are several scenes: of one to four, for which there is more patience
-# What is said of the next five was measured with the built-in studies on two threads; the spread is over these.
+# What is said of the next seven was measured with the built-in studies on two threads; the spread is over these.
 CLIMB = 10.0  # times the convergence of a few variants that pilots take on the ladder: 2 to 23
 MARCHED = 0.07  # of that convergence that a scene's march takes by what pilots tell: of swept motions on frames
 BROKEN_OFF = 2.5  # times the seconds after which some pilots were broken off that all of them take: 2 to 3
@@ -34,7 +35,6 @@ UNFINISHED = 2.0  # times the seconds in which variants did not converge that th
 AROUND = 1.6  # times loading and planning: gathering and writing take about half as much
 LONGER = 2.5  # times a round that the next one takes: four times the pilots by the same tables
 CONVERGED, SCENES = 8, 3  # variants that converge, and scenes that they are of
-Clock = Callable[[], float]
 TIMED = 1024  # variants by which the pace of the march is measured
 
 
@@ -54,7 +54,7 @@ class Time(NamedTuple):
 
     usual: float
     last: float
-    clock: Clock
+    clock: Callable[[], float]
 
 
 class Looked(NamedTuple):
@@ -64,11 +64,6 @@ class Looked(NamedTuple):
     seconds: float
 
 
-def nothing() -> float:
-    """No seconds."""
-    return 0.0
-
-
 @one_thread()
 def forecast(
     plan: Plan,
@@ -76,21 +71,21 @@ def forecast(
     seconds: float = SECONDS,
     rounds: Sequence[int] = ROUNDS,
     patience: float = PATIENCE,
-    compiled: Clock = nothing,
+    compiled: float = 0.0,
 ) -> Forecast:
     """What is measured within so many seconds: how some variants converge, for which there is more ``patience``, then
-    as many pilots as there is time for; compiled: seconds in which kernels were compiled so far, which do not count."""
-    around = AROUND * (time.process_time() - compiled())
+    as many pilots as there is time for. That kernels are compiled does not count; compiled: seconds of that before."""
+    around = AROUND * (time.process_time() - compiled)
     warm_up(plan)
-    clock = partial(_without, compiled)
-    begun = clock()
     groups = [ConvergingGroup(*scene) for scene in zip(plan.grids, plan.members, strict=True)]
-    looked = _converge(plan, groups, begun + patience, clock)
-    if plan.converges:
-        found = _of_convergence(plan, looked, threads)
-    else:
-        with _where_it_runs(plan, threads) as here:
-            found = _choose(plan, here, looked, Time(begun + seconds, begun + patience, clock), rounds)
+    with clock_without_compiling() as clock:
+        until = Time(clock() + seconds, clock() + patience, clock)
+        looked = _converge(plan, groups, until)
+        if plan.converges:
+            found = _of_convergence(plan, looked, threads)
+        else:
+            with _where_it_runs(plan, threads) as here:
+                found = _choose(plan, here, looked, until, rounds)
     return found._replace(seconds=found.seconds + around + _audit(found.plan, looked, threads))
 
 
@@ -108,18 +103,13 @@ def _audit(plan: Plan, looked: Looked, threads: int) -> float:
     return AUDIT * looked.seconds * scenes / min(threads, max(scenes, 1))
 
 
-def _without(compiled: Clock) -> float:
-    """Seconds, without those in which kernels were compiled."""
-    return time.perf_counter() - compiled()
-
-
-def _past(end: float, clock: Clock) -> bool:
+def _past(end: float, clock: Callable[[], float]) -> bool:
     return clock() > end
 
 
-def _converge(plan: Plan, groups: Sequence[Group], end: float, clock: Clock) -> Looked:
+def _converge(plan: Plan, groups: Sequence[Group], until: Time) -> Looked:
     """Some variants of a few scenes, as they converge, as long as there is time."""
-    halted = partial(_past, end, clock)
+    halted, clock = partial(_past, until.last, until.clock), until.clock
     parts: list[chosen.Part] = []
     took, some = [], [groups[place] for place in spread(len(groups), SCENES)]
     for group in some:
@@ -146,12 +136,13 @@ def _of_convergence(plan: Plan, looked: Looked, threads: int) -> Forecast:
 
 
 def _without_pilots(plan: Plan, looked: Looked, threads: int, tried: float) -> Forecast:
-    """A study whose pilots take longer than there is time; tried: seconds after which some of all were broken off, 0
-    where there was no time to begin."""
+    """A study whose pilots take longer than there is time; tried: seconds after which the first of them, of one scene
+    or of a few, were broken off, 0 where there was no time to begin."""
     pilots = pilots_of(plan.cases, plan.members).size
     less = f"there was no time for pilots: a run measures {pilots}, and takes what they show to be enough"
     scenes = scenes_of_pilots(len(plan.grids), plan.size, usual_pilots(plan.size))
-    seconds = max(BROKEN_OFF * tried, CLIMB * looked.seconds * scenes / min(threads, scenes))
+    few = scenes_of_pilots(len(plan.grids), plan.size, FIRST)
+    seconds = max(BROKEN_OFF * tried * scenes / few, CLIMB * looked.seconds * scenes / min(threads, scenes))
     seconds += MARCHED * looked.seconds * len(plan.grids) / (threads if plan.many_scenes else 1)
     if not looked.parts:
         return Forecast(plan, "", (), seconds, f"{less}; this may take longer")
@@ -179,9 +170,9 @@ def _choose(plan: Plan, here: Place, looked: Looked, until: Time, rounds: Sequen
             break
         found = _Round(trial, pilots, until.clock() - started)
         expected = LONGER * found.took
-    return (
-        _of_pilots(found, here.slots, start, until.clock) if found else _without_pilots(plan, looked, here.slots, tried)
-    )
+    if found is None:
+        return _without_pilots(plan, looked, here.slots, tried)
+    return _of_pilots(found, here.slots, start, until.clock)
 
 
 def _awake(plan: Plan, lanes: Counts, halted: Callable[[], bool]) -> None:
@@ -197,7 +188,7 @@ class _Round(NamedTuple):
     took: float
 
 
-def _of_pilots(found: _Round, threads: int, start: float, clock: Clock) -> Forecast:
+def _of_pilots(found: _Round, threads: int, start: float, clock: Callable[[], float]) -> Forecast:
     """A study of which some pilots are measured; start: seconds until its processes have started."""
     plan, usual = found.trial, usual_pilots(found.trial.size)
     measured, drawn = (pilots_of(plan.cases, plan.members, count).size for count in (found.pilots, PILOTS))
@@ -212,7 +203,7 @@ def _of_pilots(found: _Round, threads: int, start: float, clock: Clock) -> Forec
     return Forecast(plan, title, chosen.rows(chosen.chosen(plan)), start + found.took * longer + march / threads)
 
 
-def _pace(plan: Plan, clock: Clock) -> tuple[float, float]:
+def _pace(plan: Plan, clock: Callable[[], float]) -> tuple[float, float]:
     """Time of the march over the expected, by the group that takes most of it, and seconds that its tables take."""
     group = max(plan.groups, key=lambda group: group.seconds_per_variant * group.variants.size)
     variants, took = group.variants[:TIMED], list[float]()

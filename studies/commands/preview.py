@@ -25,7 +25,7 @@ from engine.scene.variants import VariantValues
 from engine.statics.coupled_modes import CoupledModes, coupled_modes
 from results_schema.arrays import Array
 from studies.commands import planned_numerics as chosen
-from studies.commands.forecast import AROUND, Clock, Forecast, forecast, nothing
+from studies.commands.forecast import AROUND, Forecast, forecast
 from studies.commands.sampled import sampled
 from studies.findings.in_step import speeds_in_step
 from studies.protocol.parts import Foreseen, Pieces, TextTable, Variants
@@ -56,14 +56,14 @@ class Preview:
 
 
 @singledispatch
-def preview(parts: Any, threads: int, compiled: Clock = nothing) -> Preview:
+def preview(parts: Any, threads: int, compiled: float = 0.0) -> Preview:
     """The explanation of a study's work for so many threads. compiled: seconds in which kernels were compiled so far,
     as only a first run does."""
     raise NotImplementedError
 
 
 @preview.register
-def _of_variants(parts: Variants, threads: int, compiled: Clock = nothing) -> Preview:
+def _of_variants(parts: Variants, threads: int, compiled: float = 0.0) -> Preview:
     """That of a plan, from a few seconds of measuring."""
     plan = parts.plan
     seen = forecast(plan, threads, compiled=compiled)
@@ -105,11 +105,11 @@ def _audited(variants: int, wanted: int | str) -> str:
 
 
 @preview.register
-def _of_pieces(parts: Pieces, threads: int, compiled: Clock = nothing) -> Preview:
+def _of_pieces(parts: Pieces, threads: int, compiled: float = 0.0) -> Preview:
     """That of pieces, one after another, and the time they take."""
     kind, study, pieces = parts.kind, parts.study, parts.pieces
     rows = [("kind", study.kind), ("asks", kind.question), *[("pieces", str(len(pieces)))] * (len(pieces) > 1)]
-    cases, around = expand(study), AROUND * (time.process_time() - compiled())
+    cases, around = expand(study), AROUND * (time.process_time() - compiled)
     seen = kind.foreseen(study, threads, parts.audited)
     each = {} if seen else sampled(pieces, threads)
     if kind.sweeps:

@@ -128,6 +128,7 @@ KIND = Asymmetry()
 
 
 def _check_comes_back(study: Study) -> None:
+    """Refuse a first carriage that does not come back at constant speed. Raises BadInput."""
     name, carriage = first_carriage(study)
     if carriage.motion.legs is None:
         here = f"carriage.{name}.motion.kind"

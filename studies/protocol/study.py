@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from results_schema.errors import BadInput, Remark
 from results_schema.lazy_imports import xr
-from results_schema.registry import ABSENT, Pieces, lacks, no_row_of
+from results_schema.registry import ABSENT, Pieces, by_other_names, lacks, no_row_of
 from results_schema.validate import validate
 from studies.protocol.checksum import VALUES, checksum_of_values
 from studies.protocol.listener import NOBODY, Listener
@@ -240,16 +240,12 @@ KINDS: Pieces[Kind] = Pieces(
 )
 
 #: What others call a kind of study.
-MEANT = {
-    other: kind
-    for kind, others in (
-        ("passage", "moving-load moving-loads moving-mass crossing"),
-        ("eigenfrequencies", "modal modes eigen frequencies"),
-        ("trajectory", "transient dynamic time-history"),
-        ("influence", "static statics"),
-    )
-    for other in others.split()
-}
+MEANT = by_other_names(
+    ("passage", "moving-load moving-loads moving-mass crossing"),
+    ("eigenfrequencies", "modal modes eigen frequencies"),
+    ("trajectory", "transient dynamic time-history"),
+    ("influence", "static statics"),
+)
 
 
 def kind_names() -> tuple[str, ...]:
