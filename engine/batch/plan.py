@@ -68,8 +68,8 @@ FEW, FEW_IN_SCENE, FEW_SCENES = 256, 16, 128
 #: most of their work is Python, in which threads wait for each other. On two cores threads and processes took 2.8 and
 #: 2.9 s for 20 scenes that converge, 9.2 and 6.7 for 100; with pilots 2.9 and 2.7 s for two, 6.9 and 4.4 for eight.
 FEW_CONVERGING, FEW_CLIMBING = 24, 3
-#: Variants of which processes get the choice, each for itself: of 4e6 in 4 scenes threads take 31 s and 890 MiB, and
-#: two processes 34 s and 2.3 GiB.
+#: Variants of which processes get the choice, each for itself: of 1e6 in 8 scenes threads take 10.9 s and two processes
+#: 8.5; of 4e6 in 4 scenes 31 s and 890 MiB, and 34 s and 2.3 GiB.
 MOST_SENT = 2**20
 NOBODY: Counts = np.zeros(0, dtype=np.int64)
 
