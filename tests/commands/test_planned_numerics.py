@@ -142,3 +142,11 @@ def test_of_several_scenes_a_few_pilots_are_measured_with_more_patience() -> Non
     )
     hurried = forecast(found, 1, -1.0, patience=-1.0)
     assert "there was no time for pilots" in hurried.remark
+
+
+def test_pilots_of_one_scene_that_are_broken_off_tell_of_those_of_all() -> None:
+    """Of 40 scenes 128 pilots are of 16, the first four of one."""
+    lengths = {"of": "body.bed.length", "from": 1.0, "to": 2.0, "count": 40}
+    found = planned(beam(modes="auto"), {"length": lengths, "speed": SPEEDS | {"count": 30}})
+    seen = forecasting._without_pilots(found, Looked([], 0.0), 1, 2.0)
+    assert seen.seconds == forecasting.BROKEN_OFF * 2.0 * 16
