@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -155,7 +155,7 @@ Paths = Annotated[
 
 
 DRAWN = "sobol = N draws N values between from and to"
-OWN_DRAWS = f"{DRAWN}; draws of your own are values = [...], of several numbers with zip = true (docs/python.md)"
+OWN_DRAWS = f"{DRAWN}; draws of your own are values = [...], of several numbers with zip (docs/python.md)"
 
 
 class SweepAxis(Spec):
@@ -222,12 +222,32 @@ class SweepAxis(Spec):
 
 
 class Sweep(Spec):
-    """All axes by name. zip: axes of equal length are paired instead of spanning a grid."""
+    """All axes by name. zip: all of them, or those that are named, are paired instead of spanning a grid."""
 
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, SweepAxis]
     entry_class = SweepAxis
-    zip: bool = False
+    zip: bool | Several[str] = False
+
+    @model_validator(mode="after")
+    def _zips_axes(self) -> Sweep:
+        missing = [name for name in self._zipped if name not in self.axes]
+        if missing:
+            what, expected = "zip names an axis that is not there", f"axes of this sweep: {', '.join(self.axes)}"
+            raise fault(what, expected=expected, received=shortened(missing[0]))
+        return self
+
+    @property
+    def _zipped(self) -> Sequence[str]:
+        """The names of the axes that are paired."""
+        if isinstance(self.zip, bool):
+            return tuple(self.axes) if self.zip else ()
+        return self.zip
+
+    @property
+    def joint(self) -> tuple[str, ...]:
+        """The names of the axes that lie along one dimension, paired or sampled."""
+        return tuple(name for name, axis in self.axes.items() if name in self._zipped or axis.sobol is not None)
 
     @property
     def axes(self) -> dict[str, SweepAxis]:

@@ -290,7 +290,7 @@ def json_schema(kinds: Sequence[str]) -> dict[str, Any]:
     found["properties"]["kind"]["enum"] = list(kinds)
     found["properties"]["sweep"] = {
         "type": "object",
-        "properties": {"zip": {"type": "boolean"}},
+        "properties": {"zip": {"anyOf": [{"type": "boolean"}, {"type": "array", "items": {"type": "string"}}]}},
         "additionalProperties": {"$ref": "#/$defs/SweepAxis"},
     }
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "wanderlast study", **found}

@@ -139,11 +139,11 @@ def expand(study: Study) -> Cases:
     axes = study.sweep.axes
     _check_sizes(study)
     _check_paths(study)
-    sampled_values = dict(_sampled(study))
+    sampled_values, joint = dict(_sampled(study)), study.sweep.joint
     dims: dict[str, int] = {}
     found = []
     for name, axis in axes.items():
-        dim = VARIANT if study.sweep.zip or axis.sobol is not None else name
+        dim = VARIANT if name in joint else name
         own = listed if axis.values is not None else ranged
         values = sampled_values[name] if name in sampled_values else own(study, name, axis)
         unit = study.unit(axis.of[0])
@@ -193,7 +193,7 @@ def _check_sizes(study: Study) -> None:
     """Sizes as Python's integers, before anything is allocated."""
     axes, where = study.sweep.axes, study.source.where("sweep")
     sizes = {name: axis.size for name, axis in axes.items()}
-    together = {name: size for name, size in sizes.items() if study.sweep.zip or axes[name].sobol is not None}
+    together = {name: sizes[name] for name in study.sweep.joint}
     if len(set(together.values())) > 1:
         what = "zipped axes differ in length" if study.sweep.zip else "sampled axes differ in size"
         raise BadInput(what, where=where, expected="one length", received=_product(together, ", "))
@@ -231,7 +231,8 @@ def _check_repeats(study: Study, cases: Cases) -> None:
     for axis in cases.axes:
         if axis.dim != VARIANT:
             check_distinct(study, axis.name, axis.values)
-    rows = np.array([axis.values for axis in cases.axes]) if study.sweep.zip and cases.axes else np.zeros((1, 0))
+    paired = [axis.values for axis in cases.axes if axis.dim == VARIANT] if study.sweep.zip else []
+    rows = np.array(paired) if paired else np.zeros((1, 0))
     counts = np.unique(rows, axis=1, return_counts=True)[1]
     if (counts > 1).any():
         what = "zipped axes repeat a variant"

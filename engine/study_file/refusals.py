@@ -260,13 +260,15 @@ def _is_union(annotation: Any) -> bool:
 
 
 def _arms(annotation: Any) -> Iterator[Any]:
-    """The types of which a value of this type is one; words out of a list are `str`."""
+    """The types of which a value of this type is one; of words or numbers out of a list, theirs."""
     bare = _bare(annotation)
     if _is_union(bare):
         for arm in get_args(bare):
             yield from _arms(arm)
+    elif get_origin(bare) is Literal:
+        yield from map(type, get_args(bare))
     else:
-        yield str if get_origin(bare) is Literal else bare
+        yield bare
 
 
 def _class_of(place: FieldType, value: Any) -> type[Spec] | None:

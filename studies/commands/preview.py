@@ -19,7 +19,7 @@ from engine.model.scene_model import SceneModel
 from engine.model.station_path import frozen
 from engine.scene.sensors import Envelope, Sensor
 from engine.scene.study import Study
-from engine.scene.sweep import Axis, Cases, cells_of, expand
+from engine.scene.sweep import Cases, cells_of, expand
 from engine.scene.trains import axle_name
 from engine.scene.variants import VariantValues
 from engine.statics.coupled_modes import CoupledModes, coupled_modes
@@ -29,6 +29,7 @@ from studies.commands.forecast import AROUND, Forecast, forecast
 from studies.commands.sampled import sampled
 from studies.findings.in_step import speeds_in_step
 from studies.protocol.parts import Foreseen, Pieces, TextTable, Variants
+from studies.results.axes import Axis
 from studies.results.findings_common import has_dampers, told_trains
 from studies.results.formatting import (
     counted,
@@ -38,8 +39,6 @@ from studies.results.formatting import (
     quantity,
     spanned,
     typed_speed,
-    typed_unit,
-    unit_text,
 )
 
 FREQUENCIES_SHOWN = 6
@@ -273,20 +272,12 @@ def _sweep(study: Study, cases: Cases) -> TextTable:
         (
             axis.name,
             str(len(axis.values)),
-            _range(study, axis),
+            Axis.of_scene(study, axis).range,
             ", ".join(axis.of),
         )
         for axis in cases.axes
     ]
     return TextTable("Sweep", ("axis", "values", "range", "sets"), rows)
-
-
-def _range(study: Study, axis: Axis) -> str:
-    """Smallest and largest value of a swept number, in the unit of the study file."""
-    typed = typed_unit(study, axis.name)
-    if typed is None:
-        return f"{spanned(axis.values)} {unit_text(axis.units)}".strip()
-    return f"{spanned(axis.values * typed.factor)} {typed.unit}"
 
 
 def _ratios(plan: Plan) -> TextTable:

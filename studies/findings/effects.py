@@ -8,7 +8,7 @@ import numpy as np
 
 from results_schema.arrays import Array
 from results_schema.lazy_imports import xr
-from studies.results.axes import VARIANT, Axis
+from studies.results.axes import DIRECTION, VARIANT, Axis
 from studies.results.formatting import ALIKE, listed, number, percent, quantity
 from studies.results.results import Results
 
@@ -65,7 +65,8 @@ def told_effects(results: Results, values: Array, what: str, error: Array | floa
         return ""
     doubt = np.broadcast_to(np.nan_to_num(error), known.shape)
     lines = {axis: _worst(results, axis, known, doubt) for axis in axes}
-    told = [_effect(axis, *line) for axis, line in lines.items() if (line[0] > 0.0).all()]
+    own = [axis for axis in axes if not axis.sets(DIRECTION)]  # which `told_both_ways` tells
+    told = [_effect(axis, *lines[axis]) for axis in own if (lines[axis][0] > 0.0).all()]
     return f"Over all else that is swept, {what} {listed(told)}." if told else ""
 
 
@@ -76,6 +77,8 @@ def told_for_each(results: Results, values: Array, units: str) -> str:
     if VARIANT in results.dims or len(axes) != 2 or not len(axes[0].values) <= MOST_EACH < len(axes[1].values):
         return ""
     few, other = axes
+    if few.sets(DIRECTION):
+        return ""  # `told_both_ways` tells it
     known = np.where(results.with_values & np.isfinite(values), values, -np.inf)
     lines = np.moveaxis(known, results.dims.index(few.dim), 0)
     told = [
@@ -86,6 +89,34 @@ def told_for_each(results: Results, values: Array, units: str) -> str:
     ]
     tops = {part.partition(" at ")[0] for part in told}
     return f" For each {few.noun} it is largest with {listed(told)}." if len(tops) > 1 else ""
+
+
+def told_both_ways(results: Results, values: Array, what: str, units: str, error: Array | float = 0.0) -> str:
+    """Whether positive values (in the sweep's shape) are the same forward and backward, and where they differ most, as
+    a sentence behind another; "" where the direction of a motion is not swept. error: of the values."""
+    axis = next((axis for axis in results.axes if axis.sets(DIRECTION) and axis.values.size > 1), None)
+    if axis is None or axis.dim == VARIANT:
+        return ""
+    order, rest = np.argsort(-axis.values), [dim for dim in results.dims if dim != axis.dim]
+    known, doubt = np.where(results.with_values, values, np.nan), np.broadcast_to(np.nan_to_num(error), values.shape)
+    pairs, doubts = (np.moveaxis(one, results.dims.index(axis.dim), 0)[order] for one in (known, doubt))
+    apart = np.abs(pairs[0] - pairs[1])
+    if not np.isfinite(apart).any():
+        return ""
+    if np.nanmax(apart) <= ALIKE * np.nanmax(pairs):
+        return f" Forward and backward {what} is the same."
+    if not (apart > doubts.sum(axis=0)).any():
+        return f" Forward and backward {what} is the same within its estimated error."
+    flat = int(np.nanargmax(apart))
+    worst = dict(zip(rest, map(int, np.unravel_index(flat, apart.shape)), strict=True))
+    others = [other for other in results.axes if other is not axis and other.values.size > 1]
+    at = ", ".join(other.at(worst[other.dim]) for other in others)
+    pair = pairs.reshape(2, -1)[:, flat]
+    forward, backward = (quantity(float(value), units) for value in pair)
+    if forward == backward:
+        most = percent(float(np.ptp(pair) / pair.max()))
+        return f" Forward and backward {what} hardly differs: by at most {most}{at and f', at {at}'}."
+    return f" Forward and backward {what} differs{at and f' most at {at}'}: {forward} forward, {backward} backward."
 
 
 def _worst(results: Results, axis: Axis, values: Array, error: Array) -> tuple[Array, Array]:

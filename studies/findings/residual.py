@@ -8,7 +8,7 @@ from results_schema.arrays import Array, Mask
 from studies.findings.absolute_errors import absolute_errors, told_error
 from studies.findings.amplification import only_rounding, sizes
 from studies.findings.beyond import LIMITED, AskedOfRest, Limits, in_turns, out_of_reach, where_beyond
-from studies.findings.effects import by_effect
+from studies.findings.effects import by_effect, told_both_ways
 from studies.results.axes import VARIANT, Axis
 from studies.results.findings_common import in_words
 from studies.results.formatting import ROUNDING, counted, listed, quantity
@@ -93,14 +93,15 @@ def _residual(results: Results, sensor: str, asked: AskedOfRest) -> str:
     size = float(values[place])
     if quiet(results, sensor):
         return f"{sensor}: at rest it does not swing."
-    error = float(absolute_errors(results, f"{sensor}_residual")[place])  # parts of a static value mislead here
+    doubt = absolute_errors(results, f"{sensor}_residual")
+    error = float(doubt[place])  # parts of a static value mislead here
     said = (
         f"{sensor}: at rest it still swings by up to {quantity(size, units)}"
         f"{told_error(error, size, units)}{in_words(results, place)}"
     )
     axis = next(iter(by_effect(results, values)), None)
     limit, settled = asked.residual.of(results.study.sensor[sensor]), _settled(results, sensor, asked, axis)
-    between = _told_between(results, values, place)
+    between = told_both_ways(results, values, "that swing", units, doubt) + _told_between(results, values, place)
     if limit is None:
         return f"{said}{settled}.{between}"
     over = f"over {axis.noun} " if axis is not None and axis.dim != VARIANT else ""

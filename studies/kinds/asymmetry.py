@@ -131,9 +131,13 @@ def _check_comes_back(study: Study) -> None:
     """Refuse a first carriage that does not come back at constant speed. Raises BadInput."""
     name, carriage = first_carriage(study)
     if carriage.motion.legs is None:
-        here = f"carriage.{name}.motion.kind"
+        here, direction = f"carriage.{name}.motion.kind", f"carriage.{name}.motion.direction"
         what = "forward and backward are compared between the turns, on a way that comes back at constant speed"
-        remedy = "two passages, one with start and end exchanged, and compare of their archives"
+        remedy = "two passages, one with the way the other way round, and compare of their archives"
+        if direction in study.numbers():
+            remedy = (
+                f'kind = "passage" with way = {{ of = "{direction}", values = ["forward", "backward"] }} in [sweep]'
+            )
         if carriage.motion.period is not None:
             remedy = 'kind = "double-peak" asks what a cycle of it does'
         received = f'"{study.value(here)}"'

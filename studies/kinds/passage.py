@@ -31,7 +31,7 @@ from studies.findings.beyond import (
     where_beyond,
 )
 from studies.findings.contacts import told_contacts, told_uplift
-from studies.findings.effects import by_effect, hardly_changed, told_effects, told_for_each, unchanged
+from studies.findings.effects import by_effect, hardly_changed, told_both_ways, told_effects, told_for_each, unchanged
 from studies.findings.envelopes import beyond_sensors, sizes_along, told_along
 from studies.findings.in_step import told_between_speeds
 from studies.findings.residual import check_residual, most_ringing, residuals
@@ -164,14 +164,16 @@ def _effects(results: Results, envelopes: list[str], sensors: list[str]) -> str:
             f"{results.noun_along(name)} along {results.study.envelope[name].body}",
             sizes_along(results, name),
         )
+        units = results.envelopes[name]
     else:
         what, values = results.noun(sensors[0]), sizes(results, sensors[0])
-        error = errors_of_size(results, sensors[0])
-        if hardly_changed(results, values, partial(quantity, units=results.sensors[sensors[0]])):
-            return ""
-        each = told_for_each(results, values, results.sensors[sensors[0]])
+        error, units = errors_of_size(results, sensors[0]), results.sensors[sensors[0]]
+        if hardly_changed(results, values, partial(quantity, units=units)):
+            return told_both_ways(results, values, f"the largest {what}", units, error)
+        each = told_for_each(results, values, units)
     said = told_effects(results, values, f"the largest {what}", error)
-    return f" {said}{each}" if said else ""
+    ways = told_both_ways(results, values, f"the largest {what}", units, error)
+    return f" {said}{each}{ways}" if said else ways
 
 
 def _amplified(results: Results, sensor: str) -> str:

@@ -32,7 +32,7 @@ from studies.protocol.study import kind_named
 from studies.reporting.answers import figures_of, found_of
 from studies.reporting.summary import every, in_tables, noun
 from studies.results.axes import Axis
-from studies.results.formatting import counted, number, typed_unit, unit_text
+from studies.results.formatting import counted, number, unit_text
 from studies.results.results import Results
 from studies.runs import audit
 from studies.runs.archived import results_of
@@ -336,9 +336,8 @@ def _sweep(results: Results) -> list[Row]:
 
     found = []
     for one in expand(results.study).axes if results.study.sweep.axes else ():
-        values, typed = np.asarray(one.values, dtype=np.float64), typed_unit(results.study, one.name)
-        axis = Axis(one.name, one.dim, one.targets, values, one.units, typed)
-        found.append(Row(axis.noun, f"{axis.span}, {counted(values.size, 'value')}", ", ".join(one.of)))
+        axis = Axis.of_scene(results.study, one)
+        found.append(Row(axis.noun, f"{axis.span}, {counted(axis.values.size, 'value')}", ", ".join(one.of)))
     return found
 
 

@@ -4,12 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from results_schema.arrays import Array
-from studies.results.formatting import Scale, axis_title, spanned, swept_quantity
+from studies.results.formatting import Scale, axis_title, spanned, swept_quantity, typed_unit, unit_text
+
+if TYPE_CHECKING:
+    from engine.scene import sweep
+    from engine.scene.study import Study
 
 VARIANT = "variant"
 PACES = (".motion.frequency", ".motion.speed")
+DIRECTION = ".motion.direction"
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +34,12 @@ class Axis:
     values: Array
     units: str
     typed: Scale | None = None
+
+    @classmethod
+    def of_scene(cls, study: Study, axis: sweep.Axis) -> Axis:
+        """That of a study's sweep."""
+        values = np.asarray(axis.values, dtype=np.float64)
+        return cls(axis.name, axis.dim, axis.targets, values, axis.units, typed_unit(study, axis.name))
 
     @property
     def paths(self) -> tuple[str, ...]:
@@ -57,13 +71,22 @@ class Axis:
         return self.typed.factor if self.typed else 1.0
 
     def in_words(self, value: float) -> str:
-        """A value (SI) with its unit."""
+        """A value (SI) with its unit, or what it stands for."""
+        if self.sets(DIRECTION):
+            return "forward" if value > 0.0 else "backward"
         return swept_quantity(value, self.units, self.typed)
 
     @property
     def span(self) -> str:
         """Its smallest and largest value, or its one value, with units."""
         return spanned([self.values.min().item(), self.values.max().item()], self.in_words)
+
+    @property
+    def range(self) -> str:
+        """The same with the unit once, for tables."""
+        if self.sets(DIRECTION):
+            return self.span
+        return f"{spanned(self.shown)} {self.typed.unit if self.typed else unit_text(self.units)}".strip()
 
     def value(self, index: int) -> str:
         """One value with its unit."""

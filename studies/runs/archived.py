@@ -139,8 +139,8 @@ def _axis_findings(root: xr.Dataset, study: Study) -> Iterator[str]:
             return
         yield from _differing(root, cells.axes)
         return
-    joint = {name: study.sweep.zip or axis.sobol is not None for name, axis in study.sweep.axes.items()}
-    sizes = {VARIANT if joint[name] else name: axis.size for name, axis in study.sweep.axes.items()}
+    joint = study.sweep.joint
+    sizes = {VARIANT if name in joint else name: axis.size for name, axis in study.sweep.axes.items()}
     # Before the axes are spread out: a text can ask for thousands of millions of variants.
     if list(root["status"].sizes.items()) != list(sizes.items()):
         yield f"status: expected the axes {sizes} of the study, received {dict(root['status'].sizes)}"

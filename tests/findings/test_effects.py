@@ -9,7 +9,7 @@ import studies
 from engine.scene.study import Study
 from results_schema.status import Status
 from studies.findings.amplification import sizes
-from studies.findings.effects import told_effects, told_for_each, unchanged
+from studies.findings.effects import told_both_ways, told_effects, told_for_each, unchanged
 from studies.reporting import answers
 from studies.results.results import Results
 from tests.studies import scenes
@@ -36,6 +36,47 @@ def test_the_largest_is_told_for_each_value_of_a_number_that_has_few() -> None:
         answers.answer(results.dataset)[0].endswith(told_for_each(results, sizes(results, "midspan"), "m"))
         and "For each mass" in answers.answer(results.dataset)[0]
     )
+
+
+WAY = 'way = { of = "carriage.table.motion.direction", values = ["forward", "backward"] }'
+
+
+def test_forward_is_compared_with_backward() -> None:
+    """In words; the values are those of two studies, one with the ends of the way exchanged, to the last bit."""
+    clamped = {"body.bed.supports": "clamped-free", "solver.steps": 800, "solver.scheme": "average-acceleration"}
+    exchanged = {"carriage.table.motion.start": 10.0, "carriage.table.motion.end": 0.0}
+    both = studies.run(scenes.study("passage", f"{WAY}\n{MASS}").with_values(clamped))
+    there, back = (
+        studies.run(scenes.study("passage", MASS).with_values(own)) for own in (clamped, clamped | exchanged)
+    )
+    for name in ("midspan_max", "midspan_min", "moment_min", "table_contact_force_max"):
+        np.testing.assert_array_equal(both[name].sel(way=1), there[name])
+        np.testing.assert_array_equal(both[name].sel(way=-1), back[name])
+    assert (abs(there["midspan_max"] / back["midspan_max"] - 1.0) > 0.01).all()
+    said = answers.answer(both)[0]
+    assert " forward, " in said and " backward." in said and "over way" not in said
+
+
+@pytest.mark.parametrize(
+    ("backward", "error", "words"),
+    [
+        ([1.0, 2.0, 3.0], 0.0, " Forward and backward it is the same."),
+        ([1.0, 2.1, 3.0], 0.1, " Forward and backward it is the same within its estimated error."),
+        ([1.0, 2.1, 3.2], 0.0, " Forward and backward it differs most at mass 100 kg: 3 m forward, 3.2 m backward."),
+        ([1.0, 2.0001, 3.0], 0.0, " Forward and backward it hardly differs: by at most 0.005 %, at mass 50 kg."),
+        ([1.0, np.nan, 2.9], 0.0, " Forward and backward it differs most at mass 100 kg: 3 m forward, 2.9 m backward."),
+    ],
+)
+def test_both_ways_in_words(backward: list[float], error: float, words: str) -> None:
+    """Of masses 200, 50 and 100 kg."""
+    results = Results.of(scenes.run("passage", f"{WAY}\n{MASS}"))
+    assert results.dims == ("way", "mass")
+    assert told_both_ways(results, np.array([[1.0, 2.0, 3.0], backward]), "it", "m", error) == words
+
+
+def test_without_a_swept_direction_nothing_is_said_of_both_ways() -> None:
+    results = Results.of(scenes.run("passage", MASS))
+    assert told_both_ways(results, np.ones(3), "it", "m") == ""
 
 
 def test_each_number_is_told_by_itself() -> None:

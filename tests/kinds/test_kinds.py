@@ -58,7 +58,7 @@ SPEED_READ = '[sensor.table_speed]\nbody = "bed"\nat = 3.0'
             "passage",
             {"kind": "asymmetry"},
             "[question]\namplification = 1.5",
-            r"table.motion.kind: .*comes back.*two passages, one with start and end exchanged, and compare",
+            r'motion.kind: .*comes back.*kind = "passage" with way = . of = "carriage.table.motion.direction"',
         ),
         (
             "double-peak",

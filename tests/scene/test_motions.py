@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from engine.scene.motions.along_bodies import Cruise, OutAndBack, Sinusoidal, Waypoints
-from engine.scene.motions.base import Motion
+from engine.scene.motions.base import BetweenPlaces, Motion
 from engine.scene.motions.point_to_point import PointToPoint
 from tests.naive import motions as naive
 from tests.naive.robots_as_particles import pieces
@@ -179,6 +179,34 @@ def test_point_to_point(limits: tuple[float, float, float | None], start: float,
     sides = [motion.path(motion.breaks(), side) for side in ("left", "right")]
     for order, slack in ((0, 1e-14), (1, 1e-12), *([(2, 1e-9)] if jerk else [])):
         np.testing.assert_allclose(sides[0][order], sides[1][order], rtol=0, atol=slack * scale**order * 10)
+
+
+@given(st.one_of(cruises, shuttles, moves))
+@settings(max_examples=60, deadline=None)
+def test_backward_is_the_same_motion_with_its_ends_exchanged(motion: BetweenPlaces) -> None:
+    """To the last bit, also as pieces of time, each variant in its own direction."""
+    numbers = motion.model_dump()
+    backward = type(motion)(**numbers | {"direction": "backward"})
+    exchanged = type(motion)(**numbers | {"start": motion.end, "end": motion.start})
+    tau = np.linspace(-0.1, motion.duration, 101)
+    for side in ("left", "right"):
+        for one, other in zip(backward.path(tau, side), exchanged.path(tau, side), strict=True):
+            np.testing.assert_array_equal(one, other)
+    assert (backward.legs, backward.reversals(), backward.range()) == (
+        exchanged.legs,
+        exchanged.reversals(),
+        exchanged.range(),
+    )
+    middle = 0.5 * (motion.start + motion.end)
+    assert backward.passing(middle) == exchanged.passing(middle)
+
+    def pieces_of(motion: Motion, *directions: int) -> np.ndarray:
+        columns = motion.model_dump() | {"direction": directions}
+        return motion.pieces(lambda key: np.broadcast_to(columns[key] or 0.0, len(directions)).astype(float))
+
+    np.testing.assert_array_equal(
+        pieces_of(motion, 1, -1), np.concatenate([pieces_of(motion, 1), pieces_of(exchanged, 1)])
+    )
 
 
 def test_accelerations_of_a_trapezoid_are_one_sided() -> None:

@@ -108,6 +108,28 @@ def test_zip() -> None:
     assert {axis.name for axis in cases.axes} == {"a", "b"}
 
 
+def test_some_axes_are_paired_and_the_others_cross_them() -> None:
+    """Own draws at every speed; of the place of an axis in the file only its dimension's place is a consequence."""
+    cases = sweep(
+        f'zip = ["a", "c"]\na = {{ of = "{LENGTH}", values = [15, 16, 17] }}\n'
+        f'b = {{ of = "{SPEED}", values = [1, 2] }}\nc = {{ of = "{MASS}", values = [4, 5, 6] }}'
+    )
+    assert (cases.dims, cases.shape) == (("variant", "b"), (3, 2))
+    assert [cases.values_of(n) for n in (0, 1, 4)] == [
+        {LENGTH: 15, SPEED: 1, MASS: 4},
+        {LENGTH: 15, SPEED: 2, MASS: 4},
+        {LENGTH: 17, SPEED: 1, MASS: 6},
+    ]
+    lone = sweep(f'zip = ["a"]\na = {{ of = "{MASS}", values = [4, 5] }}\nb = {{ of = "{SPEED}", values = [1] }}')
+    assert (lone.dims, lone.shape) == (("variant", "b"), (2, 1))
+
+
+def test_directions_are_words_or_signs() -> None:
+    for values in ('["forward", "backward"]', "[1, -1]"):
+        (axis,) = sweep(f'way = {{ of = "carriage.table.motion.direction", values = {values} }}').axes
+        assert axis.values.tolist() == [1, -1] and axis.values.dtype == np.int64
+
+
 def test_sobol_is_joint_and_repeatable() -> None:
     text = "\n".join(f'{name} = {{ of = "{path}", from = 1, to = 9, sobol = 256{extra} }}'
                      for name, path, extra in [("a", SPEED, ""), ("b", MASS, ', spacing = "log"'),
@@ -158,6 +180,16 @@ def test_sobol_is_joint_and_repeatable() -> None:
             "\n".join(["zip = true", axis("a", MASS, "values = [1]"), axis("b", SPEED, "values = [1, 2]")]),
             ["sweep", "1 (a), 2 (b)"],
         ),
+        (f'zip = ["b"]\n{axis("a", MASS, "values = [1]")}', ["sweep", "axes of this sweep: a", '"b"']),
+        (
+            "\n".join(['zip = ["a", "b"]', axis("a", MASS, "values = [1]"), axis("b", SPEED, "values = [1, 2]")]),
+            ["sweep", "1 (a), 2 (b)"],
+        ),
+        (
+            axis("a", "carriage.table.motion.direction", 'values = ["forwards"]'),
+            ["sweep.a.values.0", '"forward" or "backward"', "forwards"],
+        ),
+        (axis("a", "carriage.table.motion.direction", "values = [2]"), ["sweep.a.values.0", "forward"]),
         (
             "\n".join(["zip = true", axis("a", MASS, "values = [1, 1]"), axis("b", SPEED, "values = [2, 2]")]),
             ["sweep", "repeat"],

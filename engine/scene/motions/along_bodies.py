@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from engine.scene.motions.base import Array, Legs, Motion, Path, Reversal, Side, two_places
+from engine.scene.motions.base import Array, BetweenPlaces, Legs, Motion, Path, Reversal, Side, both_places, two_places
 from engine.scene.motions.of_joints import AMPLITUDE, CONSTANT, PHASE, RATE, START, Number, blank, spline_pieces
 from engine.scene.motions.point_to_point import PointToPoint
 from engine.study_file.checks import Check, on_body
@@ -19,7 +19,7 @@ from engine.study_file.units import Damping, Dimensionless, Force, Frequency, Le
 from results_schema.lazy_imports import interpolate
 
 
-class Cruise(Motion):
+class Cruise(BetweenPlaces):
     """Constant speed from start to end; either may lie off the body. tau = 1 is one passage.
 
     after: free vibration afterwards, in first periods of the body.
@@ -29,9 +29,7 @@ class Cruise(Motion):
     passes = True
     in_pieces = True
     kind: Literal["cruise"]
-    start: Length
-    end: Length
-    speed: Annotated[Speed, Hint("end < start runs backward")] = Field(gt=0)
+    speed: Annotated[Speed, Hint("end < start runs backward, and so does direction = -1")] = Field(gt=0)
     after: Dimensionless = Field(default=0.0, ge=0, le=1e6)
 
     @property
@@ -46,31 +44,29 @@ class Cruise(Motion):
     def free_vibration(self) -> float:
         return self.after
 
-    def range(self) -> tuple[float, float]:
-        return min(self.start, self.end), max(self.start, self.end)
-
     def checks(self, here: str, length: str) -> list[Check]:
         start, end = f"{here}.start", f"{here}.end"
         touch = Check(here, (length, start, end), _line_touches, _NO_TOUCH, _TOUCHING)
         return [two_places(start, end), touch]
 
     def law(self, tau: Array, side: Side) -> Path:
-        velocity = np.full_like(tau, self.end - self.start)
-        return Path((1.0 - tau) * self.start + tau * self.end, velocity, np.zeros_like(tau))
+        first, last = self.way
+        return Path((1.0 - tau) * first + tau * last, np.full_like(tau, last - first), np.zeros_like(tau))
 
     def passing(self, place: float) -> tuple[float, ...]:
-        tau = (place - self.start) / (self.end - self.start)
+        first, last = self.way
+        tau = (place - first) / (last - first)
         return (tau,) if 0.0 < tau < 1.0 else ()
 
     def pieces(self, number: Number) -> Array:
-        start, end, speed = (number(key) for key in ("start", "end", "speed"))
+        (start, end), speed = both_places(number), number("speed")
         found = blank(start, 2)
         found[:, 0, CONSTANT], found[:, 0, CONSTANT + 1] = start, np.sign(end - start) * speed
         found[:, 1, START], found[:, 1, CONSTANT] = np.abs(end - start) / speed, end
         return found
 
 
-class OutAndBack(Motion):
+class OutAndBack(BetweenPlaces):
     """From start to end and back, `cycles` times, at constant speed v but for smooth turns. tau = 1 is one cycle.
 
     With d = turn |end - start| and t_r = pi d/v it starts at rest in the middle of a turn, s = start + d (1 -
@@ -84,8 +80,6 @@ class OutAndBack(Motion):
     ends = ("start", "end")
     in_pieces = True
     kind: Literal["out-and-back"]
-    start: Length
-    end: Length
     speed: Speed = Field(gt=0)
     turn: Dimensionless = Field(ge=0, le=0.5)
     cycles: int = Field(ge=1, le=1_000_000)
@@ -114,15 +108,12 @@ class OutAndBack(Motion):
 
     @property
     def legs(self) -> Legs:
-        return Legs(self.start, self.end, self.turn, (self.half_turn, 0.5 - self.half_turn))
-
-    def range(self) -> tuple[float, float]:
-        return min(self.start, self.end), max(self.start, self.end)
+        return Legs(*self.way, self.turn, (self.half_turn, 0.5 - self.half_turn))
 
     def reversals(self) -> tuple[Reversal, ...]:
         if self.turn > 0.0:
             return ()
-        there = math.copysign(self.max_speed, self.end - self.start)
+        there = math.copysign(self.max_speed, self._sign)
         halves = range(1, 2 * self.cycles)
         return tuple(Reversal(k / 2, there, -there) if k % 2 else Reversal(k / 2, -there, there) for k in halves)
 
@@ -142,14 +133,14 @@ class OutAndBack(Motion):
             phase = np.where((phase == 0.0) & (tau >= self.duration), 1.0, phase)
             back = phase >= 0.5
         folded = self._there(np.where(back, 1.0 - phase, phase))
-        way = math.copysign(1.0, self.end - self.start)
+        way = self._sign
         velocity = np.where(back, -way * folded.dS, way * folded.dS)
-        position = np.clip(self.start + way * folded.S, *self.range())  # rounding must not leave the body
+        position = np.clip(self.way[0] + way * folded.S, *self.range())  # rounding must not leave the body
         return Path(position, velocity, way * folded.ddS)
 
     def pieces(self, number: Number) -> Array:
         """Half a turn, then by turns ways and turns, half a turn at last."""
-        start, end, speed, turn = (number(key) for key in ("start", "end", "speed", "turn"))
+        (start, end), speed, turn = both_places(number), number("speed"), number("turn")
         stroke = end - start
         depth, quarter = turn * stroke, 0.5 * np.pi * turn * np.abs(stroke) / speed
         way = (1.0 - 2.0 * turn) * np.abs(stroke) / speed
@@ -167,6 +158,12 @@ class OutAndBack(Motion):
             straight[:, CONSTANT] = near + into if k < ways else start
             straight[:, CONSTANT + 1] = np.sign(stroke) * speed * (1.0 if k % 2 == 0 else -1.0) if k < ways else 0.0
         return found
+
+    @property
+    def _sign(self) -> float:
+        """Of the speed on the way there."""
+        first, last = self.way
+        return math.copysign(1.0, last - first)
 
     def _there(self, tau: Array) -> Path:
         """StationPath gone on the way out, 0 <= tau <= 1/2; the three branches of the law."""

@@ -10,13 +10,15 @@ import math
 from abc import abstractmethod
 from collections.abc import Mapping
 from functools import lru_cache
-from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydantic import BeforeValidator
 
 from engine.study_file.checks import Check
-from engine.study_file.spec import SpecOfKind
+from engine.study_file.spec import Noun, SpecOfKind
+from engine.study_file.units import Length
 
 if TYPE_CHECKING:
     from engine.scene.motions.of_joints import Number
@@ -160,6 +162,42 @@ class Motion(SpecOfKind):
             for part, at_end in zip(found, self.law(times[last], "left"), strict=True):
                 part[last] = at_end
         return found
+
+
+DIRECTIONS = {"forward": 1, "backward": -1}
+
+
+def read_direction(value: Any) -> Any:
+    """A word for a direction as its number; anything else unchanged."""
+    return DIRECTIONS.get(value, value) if isinstance(value, str) else value
+
+
+_WORDS = Literal[1, -1, "forward", "backward"]
+Direction = Annotated[
+    Literal[1, -1], BeforeValidator(read_direction, json_schema_input_type=_WORDS), Noun('"forward" or "backward"')
+]
+
+
+class BetweenPlaces(Motion):
+    """Base of the motions between two places: from `start` to `end`, or the other way round where `direction` is -1."""
+
+    start: Length
+    end: Length
+    direction: Direction = 1
+
+    @property
+    def way(self) -> tuple[float, float]:
+        """Where it sets off, and where that way ends, m."""
+        return (self.start, self.end) if self.direction > 0 else (self.end, self.start)
+
+    def range(self) -> tuple[float, float]:
+        return min(self.start, self.end), max(self.start, self.end)
+
+
+def both_places(number: Number) -> tuple[Array, Array]:
+    """(V,) each where variants set off, and where that way ends, m (`BetweenPlaces.way`)."""
+    start, end, forward = number("start"), number("end"), number("direction") > 0.0
+    return np.where(forward, start, end), np.where(forward, end, start)
 
 
 def two_places(start: str, end: str) -> Check:

@@ -120,7 +120,7 @@ class Move(TimeMotion):
     jerk: Dimensionless | None = Field(default=None, gt=0)
 
     def pieces(self, number: Number) -> Array:
-        return move_pieces(number)
+        return move_pieces(number("start"), number("end"), number)
 
 
 class Points(TimeMotion):
@@ -187,9 +187,9 @@ AnySliding = Annotated[TimeMotion, KindOf(_SLIDING, SLIDING)]
 AnyCourse = Annotated[TimeMotion, KindOf("course of a load", COURSES)]
 
 
-def move_pieces(number: Number) -> Array:
-    """(V, pieces, 10) of moves from `start` to `end` within `speed`, `acceleration` and `jerk` (0: no limit)."""
-    start, end, *limits = (number(key) for key in ("start", "end", "speed", "acceleration"))
+def move_pieces(start: Array, end: Array, number: Number) -> Array:
+    """(V, pieces, 10) of moves between places (V,) within `speed`, `acceleration` and `jerk` (0: no limit)."""
+    limits = number("speed"), number("acceleration")
     jerk = np.where(number("jerk") > 0.0, number("jerk"), inf)
     found = blank(start, PHASES)
     for v, (way, *own) in enumerate(zip(np.abs(end - start), *limits, jerk, strict=True)):

@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field
 
-from engine.scene.motions.base import Array, Motion, Path, Side, two_places
+from engine.scene.motions.base import Array, BetweenPlaces, Path, Side, both_places, two_places
 from engine.scene.motions.of_joints import Number, move_pieces
 from engine.scene.motions.profile import PHASES, Profile, profile
 from engine.study_file.checks import Check, on_body
-from engine.study_file.units import Acceleration, Jerk, Length, Speed, Time
+from engine.study_file.units import Acceleration, Jerk, Speed, Time
 
 
-class PointToPoint(Motion):
+class PointToPoint(BetweenPlaces):
     """From rest at the start to rest at the end within limits of speed, acceleration and jerk, then `dwell` seconds of
     rest there. tau = 1 is all of it.
 
@@ -33,8 +33,6 @@ class PointToPoint(Motion):
     ends = ("start", "end")
     in_pieces = True
     kind: Literal["point-to-point"]
-    start: Length
-    end: Length
     speed: Speed = Field(gt=0)
     acceleration: Acceleration = Field(gt=0)
     jerk: Jerk | None = Field(default=None, gt=0)
@@ -60,9 +58,6 @@ class PointToPoint(Motion):
     def reached(self) -> Mapping[str, float]:
         top = abs(self.end - self.start) * self._move.top_speed
         return {"speed": top, "acceleration": top / (self._move.up_time - self._move.jerk_time)}
-
-    def range(self) -> tuple[float, float]:
-        return min(self.start, self.end), max(self.start, self.end)
 
     def checks(self, here: str, length: str) -> list[Check]:
         start, end = f"{here}.start", f"{here}.end"
@@ -99,7 +94,8 @@ class PointToPoint(Motion):
     def _in_phase(self, times: Array, phase: int) -> Path:
         """At times (S,) in a phase. Its second half, and the rest, are the first one backward, so that it comes to rest
         exactly."""
-        way, scale, back = self.end - self.start, self.time_scale, phase >= PHASES // 2
+        (first, last), scale, back = self.way, self.time_scale, phase >= PHASES // 2
+        way = last - first
         k = max(PHASES - 2 - phase, 0) if back else phase
         (begins, c0, c1, c2, c3), ends = self._pieces[k], self._pieces[k + 1, 0]
         since = self._move.duration - times * scale if back else times * scale
@@ -107,11 +103,11 @@ class PointToPoint(Motion):
         gone, rate = c0 + u * (c1 + u * (c2 + u * c3)), c1 + u * (2.0 * c2 + 3.0 * u * c3)
         push = 2.0 * c2 + 6.0 * u * c3
         if back:
-            return Path(self.end - way * gone, way * scale * rate, -way * scale**2 * push)
-        return Path(self.start + way * gone, way * scale * rate, way * scale**2 * push)
+            return Path(last - way * gone, way * scale * rate, -way * scale**2 * push)
+        return Path(first + way * gone, way * scale * rate, way * scale**2 * push)
 
     def pieces(self, number: Number) -> Array:
-        return move_pieces(number)
+        return move_pieces(*both_places(number), number)
 
     @cached_property
     def _move(self) -> Profile:
