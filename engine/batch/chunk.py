@@ -14,6 +14,7 @@ from engine.accuracy.groups import Found, Group, marches_again
 from engine.accuracy.jobs import Halted, Job, Share
 from engine.accuracy.results import Result, results_of, worst_held
 from engine.accuracy.shown import stations_shown
+from engine.batch.dataset import in_si
 from engine.batch.plan import NOBODY, Plan
 from engine.kernels.layout import LANES
 from engine.linear_algebra import one_thread
@@ -85,7 +86,7 @@ def run_chunk(
     error, status = told_errors(found, plan.asked), _status(plan, group, found)
     missing = lost(status)
     error[:, missing] = np.nan
-    flat = dict(found.outcome.numbers) | {
+    flat = in_si(plan, values, dict(found.outcome.numbers)) | {
         "status": status,
         "diverged_step": found.outcome.diverged_step,
         **found.used,
@@ -93,7 +94,7 @@ def run_chunk(
         "estimated_error": np.ascontiguousarray(error.T, dtype=np.float32),
         "error_estimate": _worst(error, results),
     }
-    known = [Rows(variants[lanes], arrays) for lanes, arrays in found.shown]
+    known = [Rows(variants[lanes], in_si(plan, values.part(lanes), arrays)) for lanes, arrays in found.shown]
     left = np.setdiff1d(kept, [lane for lanes, _ in found.shown for lane in lanes]).astype(np.int64)
     again = _marched_again(plan, group.grid, variants[left], _of(found.used, left), halted)
     return flat, joined([*known, *again])
@@ -178,8 +179,8 @@ def _marched_again(
         return
     values = VariantValues.of(grid.scene.study, plan.cases, variants)
     for tables, own in marches_again(grid, used):
-        counts = stations_shown(plan.asked, tables)
-        yield Rows(variants[own], histories(tables, values.part(own), counts, halted))
+        counts, part = stations_shown(plan.asked, tables), values.part(own)
+        yield Rows(variants[own], in_si(plan, part, histories(tables, part, counts, halted)))
 
 
 def crashed_chunks(plan: Plan, crashed: Sequence[Counts], share: Share) -> Iterator[Chunk]:

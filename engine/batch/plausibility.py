@@ -173,7 +173,7 @@ def _along(grid: SceneGrid, number: int) -> float:
     tau = (bounds[:-1, None] + np.diff(bounds)[:, None] * np.linspace(0.0, 1.0, MOMENTS)).ravel()
     pace = grid.scene.carriages[number].rider.pace / _time_scale(grid)
     largest = max(float(np.abs(motion.path(tau, side).ddS).max()) for side in ("left", "right"))
-    return largest * float((moving_mass(grid.scene, grid.values, number) * pace**2).max())
+    return largest * float(grid.values.in_si("N", moving_mass(grid.scene, grid.values, number) * pace**2).max())
 
 
 def doubtful(study: Study, cases: Cases) -> Iterator[str]:
@@ -230,9 +230,9 @@ def _fast(plan: Plan) -> Iterator[str]:
     worst, fastest = 0.0, 0.0
     for grid in plan.grids:
         scene = grid.scene
-        speed = float((scene.carriages[0].rider.top_speed / _time_scale(grid)).max())
-        ratio = speed * np.pi / (scene.first_omega * scene.leading_body.modal.length)
-        worst, fastest = max((worst, fastest), (ratio, speed))
+        speed = scene.carriages[0].rider.top_speed / _time_scale(grid)
+        ratio = float(speed.max()) * np.pi / (scene.first_omega * scene.leading_body.modal.length)
+        worst, fastest = max((worst, fastest), (ratio, float(grid.values.in_si("m s-1", speed)[speed.argmax()])))
     if worst > FAST:
         yield (
             f"some variants run at up to {worst:.3g} times the critical speed omega_1 L/pi, at {fastest:.3g} m/s: "
@@ -246,8 +246,9 @@ def _racing(plan: Plan) -> Iterator[str]:
     for number, tie in enumerate(plan.base.carriages):
         table = plan.study.source.written(f"carriage.{tie.name}")
         if not has_unit(plan.study, f"{table}.motion.speed"):
-            speeds = (g.scene.carriages[number].rider.top_speed / _time_scale(g) for g in plan.grids)
-            tops[table] = max(float(speed.max()) for speed in speeds), plan.study.carriage[tie.name].motion.pace
+            speeds = ((g.values, g.scene.carriages[number].rider.top_speed / _time_scale(g)) for g in plan.grids)
+            top = max(float(values.in_si("m s-1", speed).max()) for values, speed in speeds)
+            tops[table] = top, plan.study.carriage[tie.name].motion.pace
     table, (top, pace) = max(tops.items(), key=lambda found: found[1][0], default=("", (0.0, None)))
     if top > RACING:
         yield (
@@ -301,7 +302,7 @@ def _pressing(grid: SceneGrid, body: int, carriages: Iterable[int]) -> tuple[flo
     load = sum((np.abs(weight(grid.scene, grid.values, number)) for number in carriages), np.zeros(grid.values.size))
     own = grid.scene.bodies[body].modal.mass * grid.values.gravity
     share = np.divide(load, own, out=np.zeros_like(load), where=own > 0.0)
-    return float(share.max()), float(load[share.argmax()])
+    return float(share.max()), float(grid.values.in_si("N", load)[share.argmax()])
 
 
 def _weighs_with_unit(study: Study, carriage: str) -> bool:

@@ -9,10 +9,12 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from engine.scene.similarity import UnitKeys, Units
 from results_schema.arrays import Array, Counts
 
 if TYPE_CHECKING:
@@ -61,7 +63,8 @@ def structural(study: Study, cases: Cases) -> list[str]:
     """Swept keys that change the scene itself."""
     motions = {f"carriage.{name}.motion.": carriage.motion for name, carriage in study.carriage.items()}
     fixed = {f"{here}{key}" for here, motion in motions.items() for key in ("speed", "frequency") if key != motion.pace}
-    return [path for path in cases.paths if path in fixed or not LANE_KEYS.fullmatch(path)]
+    units = UnitKeys.of(study).set_by(axis.paths for axis in cases.axes)
+    return [path for path in cases.paths if path in fixed or not (LANE_KEYS.fullmatch(path) or path in units)]
 
 
 def sweeps_numerics(cases: Cases) -> bool:
@@ -83,7 +86,11 @@ def cases_tolerance(study: Study, cases: Cases) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class VariantValues:
-    """Numbers of a study for some variants: swept columns (V,) by dotted key, the study's own value elsewhere."""
+    """Numbers of a study for some variants: swept columns (V,) by dotted key, SI, the study's own value elsewhere.
+
+    What it tells of them is counted in the units in which all have the stiffness and the mass of the study's body,
+    which are SI unless one of these is swept (`engine.scene.similarity`).
+    """
 
     study: Study
     columns: Mapping[str, Array]
@@ -99,8 +106,21 @@ class VariantValues:
         found = self.columns.get(path)
         if found is None:
             value = self.study.value(path)
-            return np.full(self.size, 0.0 if value is None else float(value))  # None: a delay that is not set
-        return found
+            found = np.full(self.size, 0.0 if value is None else float(value))  # None: a delay that is not set
+        if self.units is None or (dimension := self.study.unit(path)) is None:
+            return found
+        unit = self.units.unit(dimension.symbol)
+        return found if unit is None else found / unit
+
+    @cached_property
+    def units(self) -> Units | None:
+        """The units in which they are told; None where these are SI."""
+        return Units.of(self.study, self.columns)
+
+    def in_si(self, symbol: str, values: Array) -> Array:
+        """Values (V, ...) that follow from them in SI; symbol: UDUNITS text."""
+        unit = None if self.units is None else self.units.unit(symbol)
+        return values if unit is None else values * unit.reshape(-1, *[1] * (values.ndim - 1))
 
     @property
     def gravity(self) -> Array:
@@ -151,7 +171,8 @@ class VariantValues:
         """(V,) seconds per unit of a carriage's own tau."""
         motion = self.study.carriage[carriage].motion
         if motion.pace is None:
-            return np.full(self.size, motion.time_scale)
+            scale = np.full(self.size, motion.time_scale)
+            return scale if self.units is None else scale / self.units.time
         key = f"carriage.{carriage}.motion.{motion.pace}"
         return float(motion.time_scale * self.study.value(key)) / self.column(key)
 

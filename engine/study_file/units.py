@@ -128,6 +128,16 @@ def unit_of(dimension: Any) -> Unit:
     return found
 
 
+@lru_cache(maxsize=256)
+def exponents_of(symbol: str) -> tuple[int, int, int]:
+    """Exponents of m, kg and s of a unit in UDUNITS text.
+
+    >>> exponents_of("N m"), exponents_of("1")
+    ((2, 1, -2), (0, 0, 0))
+    """
+    return (0, 0, 0) if symbol in ("", "1", "percent") else _unit_factor(symbol)[1]
+
+
 def fault(what: str, *, expected: str = "", received: str = "", remedy: str = "") -> PydanticCustomError:
     """A refusal raised inside a pydantic validator; `engine.study_file.refusals` turns it into BadInput."""
     context = {"what": what, "expected": expected, "received": received, "remedy": remedy}

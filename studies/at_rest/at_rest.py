@@ -162,7 +162,9 @@ def _evaluated(
     opened = found.pop("opened", np.zeros((values.size, places.all.size), dtype=np.bool_)) & ~gone
     for array in found.values():
         array[:, gone] = np.nan
-    found |= _errors(kind, model, values, places.all, found)
+    errors, declared = _errors(kind, model, values, places.all, found), model.study.results(kind.name)
+    found = {name: values.in_si(declared[name].units or "1", array) for name, array in found.items()}
+    found |= errors
     found["status"] = np.where(opened.any(axis=1), Status.SEPARATED, Status.OK)
     found["fidelity"] = np.full(values.size, int(kind.fidelity(model)))
     found["modes"] = np.full(values.size, model.body_modes)

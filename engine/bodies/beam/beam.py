@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import AfterValidator, Field, Tag
 
-from engine.bodies.modal.description import AUTO_MODES, MAX_MODES, Body, Rayleigh, Spot, Spots
+from engine.bodies.modal.description import AUTO_MODES, MAX_MODES, Body, Growing, Rayleigh, Spot, Spots
 from engine.bodies.modal.modal_body import SAME_PLACE, Array, ModalBody
 from engine.bodies.modal.outline import ALONG, HELD_AT, Elastic, Held, Outline, straight
 from engine.bodies.modal.section_doubts import Doubt, section_doubts
@@ -110,6 +110,12 @@ class Beam(Body):
     def springs(self) -> tuple[Spring, ...]:
         """Springs to ground; none where the ends are named."""
         return () if isinstance(self.supports, str) else self.supports
+
+    @property
+    def grows_with(self) -> Growing:
+        if self.springs:  # whose stiffness stays
+            return Growing()
+        return Growing((("youngs_modulus",), ("second_moment",)), (("density",), ("area",)))
 
     @property
     def is_simply_supported(self) -> bool:

@@ -16,7 +16,7 @@ from pydantic import AfterValidator, Field, Strict, Tag, model_validator
 
 from engine.bodies.frame.geometry import DIRECTIONS, SAME_PLACE, TrackLine, member_ends, unit
 from engine.bodies.frame.refusals import check_frame, check_spot, track_line
-from engine.bodies.modal.description import Body, Spot, Spots, check_square
+from engine.bodies.modal.description import Body, Growing, Spot, Spots, check_square
 from engine.bodies.modal.modal_body import Array, Direction, ModalBody
 from engine.bodies.modal.outline import HELD_AT, Outline
 from engine.bodies.modal.section_doubts import Doubt, section_doubts
@@ -42,6 +42,7 @@ MAX_ELEMENTS = 1000
 MAX_COORDINATE = 1e9
 MAX_POINTS = 50
 MAX_FIXED_INTERFACE_MODES = 64
+MATERIAL = "youngs_modulus", "density"
 PLANES = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
 
 _THEORIES = {"euler": "euler-bernoulli", "bernoulli": "euler-bernoulli"}
@@ -200,6 +201,13 @@ class Frame(Body):
     def length(self) -> float:
         """Of the track, m."""
         return self.line.length
+
+    @property
+    def grows_with(self) -> Growing:
+        if self.spring or any(one.shear_modulus is not None for one in self.section.values()):
+            return Growing()  # whose stiffness stays
+        moduli, densities = (tuple(f"section.{name}.{key}" for name in self.section) for key in MATERIAL)
+        return Growing((moduli,), () if self.point_mass else (densities,))
 
     @property
     def gravity(self) -> Triple:

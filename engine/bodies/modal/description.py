@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field, PrivateAttr, Strict, Tag
@@ -89,6 +89,13 @@ class Recorded(Beside):
     length: float
 
 
+class Growing(NamedTuple):
+    """Keys of numbers with which, set to one value, all stiffness of a body grows in proportion, and all its mass."""
+
+    stiffness: tuple[tuple[str, ...], ...] = ()
+    mass: tuple[tuple[str, ...], ...] = ()
+
+
 class Body(SpecOfKind):
     """Base of all bodies: a track of some length along which loads ride.
 
@@ -108,6 +115,11 @@ class Body(SpecOfKind):
     damping_ratio: DampingRatio = 0.0
     modes: Modes = "auto"
     own_weight: bool = False
+
+    @property
+    def grows_with(self) -> Growing:
+        """The numbers that change no more of it than the units of time and force."""
+        return Growing()
 
     @property
     def may_be_nothing(self) -> tuple[str, ...]:
