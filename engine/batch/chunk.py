@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,6 @@ from engine.accuracy.groups import Found, Group, marches_again
 from engine.accuracy.jobs import Halted, Job, Share
 from engine.accuracy.results import Result, results_of, worst_held
 from engine.accuracy.shown import stations_shown
-from engine.batch.dataset import in_si
 from engine.batch.plan import NOBODY, Plan
 from engine.kernels.layout import LANES
 from engine.linear_algebra import one_thread
@@ -27,6 +27,7 @@ from results_schema.errors import WorkersGaveUp
 from results_schema.gravest_status import gravest, lost
 from results_schema.status import Status
 from results_schema.store.rows import Arrays, Chunk, Rows, joined
+from results_schema.variables import axes, expand
 
 #: Jobs of short chunks, at least, and chunks of one: handed over one by one to two processes 600 scenes took 20.8 s in
 #: place of 11.4, as that takes as long as what each computes.
@@ -86,7 +87,7 @@ def run_chunk(
     error, status = told_errors(found, plan.asked), _status(plan, group, found)
     missing = lost(status)
     error[:, missing] = np.nan
-    flat = in_si(plan, values, dict(found.outcome.numbers)) | {
+    flat = _in_si(plan, values, dict(found.outcome.numbers)) | {
         "status": status,
         "diverged_step": found.outcome.diverged_step,
         **found.used,
@@ -94,10 +95,30 @@ def run_chunk(
         "estimated_error": np.ascontiguousarray(error.T, dtype=np.float32),
         "error_estimate": _worst(error, results),
     }
-    known = [Rows(variants[lanes], in_si(plan, values.part(lanes), arrays)) for lanes, arrays in found.shown]
+    known = [Rows(variants[lanes], _in_si(plan, values.part(lanes), arrays)) for lanes, arrays in found.shown]
     left = np.setdiff1d(kept, [lane for lanes, _ in found.shown for lane in lanes]).astype(np.int64)
     again = _marched_again(plan, group.grid, variants[left], _of(found.used, left), halted)
     return flat, joined([*known, *again])
+
+
+def _in_si(plan: Plan, values: VariantValues, arrays: Arrays) -> Arrays:
+    """Arrays (V, ...) of results of some variants in SI, in which these may not be counted."""
+    if values.units is None:
+        return arrays
+    sensors = plan.study.sensor_units
+    known = {**axes(), **expand(plan.results, sensors, list(plan.study.carriage), plan.study.envelope_units)}
+    found = dict[str, NDArray[Any]]()
+    for name, array in arrays.items():
+        variable = known.get(name)
+        if variable is None:  # what the study's own summary is made of
+            found[name] = values.in_si(sensors.get(name.removesuffix("_static"), "1"), array)
+        elif variable.units is not None:
+            found[name] = values.in_si(variable.units, array)
+        else:  # of every sensor in its own unit
+            place = 1 + variable.dims.index("sensor")
+            own = (values.in_si(units, array.take(number, place)) for number, units in enumerate(sensors.values()))
+            found[name] = np.stack(list(own), axis=place)
+    return found
 
 
 def told_errors(found: Found, asked: Asked) -> Array:
@@ -180,7 +201,7 @@ def _marched_again(
     values = VariantValues.of(grid.scene.study, plan.cases, variants)
     for tables, own in marches_again(grid, used):
         counts, part = stations_shown(plan.asked, tables), values.part(own)
-        yield Rows(variants[own], in_si(plan, part, histories(tables, part, counts, halted)))
+        yield Rows(variants[own], _in_si(plan, part, histories(tables, part, counts, halted)))
 
 
 def crashed_chunks(plan: Plan, crashed: Sequence[Counts], share: Share) -> Iterator[Chunk]:

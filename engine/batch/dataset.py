@@ -40,22 +40,6 @@ def _declared(plan: Plan) -> dict[str, Variable]:
     return expand(plan.results, study.sensor_units, list(study.carriage), study.envelope_units)
 
 
-def in_si(plan: Plan, values: VariantValues, arrays: Arrays) -> Arrays:
-    """Arrays (V, ...) of results of some variants in SI, in which these may not be counted."""
-    return arrays if values.units is None else {name: _in_si(plan, values, name, arrays[name]) for name in arrays}
-
-
-def _in_si(plan: Plan, values: VariantValues, name: str, array: NDArray[Any]) -> NDArray[Any]:
-    sensors, variable = plan.study.sensor_units, {**axes(), **_declared(plan)}.get(name)
-    if variable is None:
-        return values.in_si(_own_attributes(name, sensors).get("units", "1"), array)
-    if variable.units is not None:
-        return values.in_si(variable.units, array)
-    place = 1 + variable.dims.index("sensor")  # each in its own unit
-    own = [values.in_si(units, array.take(number, place)) for number, units in enumerate(sensors.values())]
-    return np.stack(own, axis=place)
-
-
 def results_over(plan: Plan, cases: Cases, arrays: Arrays) -> xr.Dataset:
     """The results of some cases of a study, without histories and ratios."""
     study, declared = plan.study, _declared(plan)

@@ -256,6 +256,11 @@ class Envelope(Spec):
         return None
 
     @property
+    def reads(self) -> Quantity:
+        """As of a sensor."""
+        return QUANTITIES[self.quantity]
+
+    @property
     def words(self) -> str:
         """What it reads, in words."""
         return self.quantity.replace("_", " ")

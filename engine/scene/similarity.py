@@ -14,9 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from engine.study_file.units import exponents_of
 from results_schema.arrays import Array
-from results_schema.quantities import QUANTITIES
 
 if TYPE_CHECKING:
     from engine.scene.sensors import Envelope, Sensor
@@ -40,7 +38,7 @@ class UnitKeys(NamedTuple):
         if len(study.body) != 1 or any(others) or any(one.frequency_limit is not None for one in readers):
             return cls()
         (name, body), *_ = study.body.items()
-        by_fibre = any(QUANTITIES[one.quantity].needs_fibre for one in readers)  # stress is M z/I
+        by_fibre = any(one.reads.needs_fibre for one in readers)  # stress is M z/I
 
         def alike(groups: tuple[Keys, ...]) -> Iterator[Keys]:
             for group in groups:
@@ -73,9 +71,9 @@ class Units(NamedTuple):
         stiffness, mass = (prod(columns[key] / float(study.value(key)) for key in some) for some in own)
         return cls(np.sqrt(mass / stiffness), np.asarray(stiffness * np.ones_like(mass)))
 
-    def unit(self, symbol: str) -> Array | None:
-        """(V,) one of its units (UDUNITS text) in SI; None where that is 1."""
-        _, mass, time = exponents_of(symbol)
+    def unit(self, exponents: tuple[int, int, int]) -> Array | None:
+        """(V,) one of its units in SI, by its exponents of m, kg and s; None where that is 1."""
+        _, mass, time = exponents
         if not mass and not time:
             return None
         return np.asarray(self.force**mass * self.time ** (time + 2 * mass))

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from engine.scene.similarity import UnitKeys, Units
+from engine.study_file.units import exponents_of
 from results_schema.arrays import Array, Counts
 
 if TYPE_CHECKING:
@@ -109,7 +110,7 @@ class VariantValues:
             found = np.full(self.size, 0.0 if value is None else float(value))  # None: a delay that is not set
         if self.units is None or (dimension := self.study.unit(path)) is None:
             return found
-        unit = self.units.unit(dimension.symbol)
+        unit = self.units.unit(dimension.exponents)
         return found if unit is None else found / unit
 
     @cached_property
@@ -119,7 +120,7 @@ class VariantValues:
 
     def in_si(self, symbol: str, values: Array) -> Array:
         """Values (V, ...) that follow from them in SI; symbol: UDUNITS text."""
-        unit = None if self.units is None else self.units.unit(symbol)
+        unit = None if self.units is None else self.units.unit(exponents_of(symbol))
         return values if unit is None else values * unit.reshape(-1, *[1] * (values.ndim - 1))
 
     @property

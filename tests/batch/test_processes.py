@@ -35,7 +35,7 @@ def of_many_scenes(count: int = FEW_SCENES + 12) -> Study:
     """So many scenes of two variants, whose numerics are fixed so that pilots are cheap."""
     fixed = {"steps": 100, "fidelity": "full", "scheme": "average-acceleration", "tolerance": 0.5, "audit": 2}
     sweep = {
-        "stiffness": {"of": "body.bed.youngs_modulus", "from": 1.0, "to": 1.5, "count": count},
+        "length": {"of": "body.bed.length", "from": 1.0, "to": 1.5, "count": count},
         "weight": {"of": "carriage.car.mass", "values": [0.1, 0.4]},
     }
     return study(beam(modes=2), mass(0.5, cruise(0.0, 1.0, 1.0)), kind="passage", solver=fixed, sweep=sweep)
