@@ -8,15 +8,23 @@ import numpy as np
 
 from engine.accuracy.grids import SceneGrid
 from engine.batch.plan import Plan
-from engine.batch.remarks_of_carriages import ends_early, has_no_band, points_up, stays_level, unreached, vanishes
+from engine.batch.remarks_of_carriages import (
+    does_not_swing,
+    ends_early,
+    has_no_band,
+    has_unit,
+    points_up,
+    stays_level,
+    swings_slowly,
+    unreached,
+    vanishes,
+)
 from engine.bodies.modal.modal_body import ModalBody
 from engine.model.lane_table import moving_mass, weight
 from engine.observation.signals import build_sensors
 from engine.scene.study import Study
 from engine.scene.sweep import Cases, broken
-from engine.scene.variants import SpringKeys
 from engine.statics.directions import left_out, told_of
-from engine.study_file.refusals import value_at
 from results_schema.arrays import Array
 from results_schema.quantities import QUANTITIES
 
@@ -31,7 +39,6 @@ DEEP = 0.1  # of the length: a static deflection beyond linear bending
 LIGHT = 0.005
 SAME_PLACE = 1e-9  # of a length: nearer places are one
 MOMENTS = 33  # of a motion between two of its breaks, at which its acceleration is looked at
-SLOW = 0.1  # Hz, of a mass on its spring: vehicles swing at 0.5 to 20 Hz, and at a thirtieth of that on N/m for kN/m
 
 
 def remarks(plan: Plan) -> list[str]:
@@ -46,31 +53,6 @@ def check_limits(plan: Plan) -> None:
             what = f"no mode of {body} has so low a frequency, so that this would read 0"
             expected, received = f"at least its first natural frequency, {first.min():.4g} Hz", f"{limits.max():.4g} Hz"
             raise plan.study.source.fault(f"{key}.frequency_limit", what, expected=expected, received=received)
-
-
-def sprung(plan: Plan) -> dict[str, tuple[Array, Array]]:
-    """The smallest and largest natural frequencies (Hz) and damping ratios of masses on their springs, of each scene,
-    by the tables that describe them."""
-    found: dict[str, list[list[float]]] = {}
-    for grid in plan.grids:
-        for name in (name for name, one in plan.study.carriage.items() if one.suspension is not None):
-            keys = SpringKeys.of_carriage(name)
-            own = (grid.values.columns.get(key, grid.values.study.value(key)) for key in keys)  # few are swept
-            stiffness, damping, mass = map(np.asarray, own)
-            omega = np.sqrt(stiffness / mass)
-            parts = omega / (2.0 * np.pi), damping / (2.0 * mass * omega)
-            ends = [end() for part in parts for end in (part.min, part.max)]
-            found.setdefault(plan.study.source.written(f"carriage.{name}"), []).append(ends)
-    return {table: (np.array(own)[:, :2], np.array(own)[:, 2:]) for table, own in found.items()}
-
-
-def _slow(plan: Plan) -> Iterator[str]:
-    for table, (frequencies, _) in sprung(plan).items():
-        if frequencies.min() < SLOW and not has_unit(plan.study, f"{table}.stiffness"):
-            yield (
-                f"the sprung mass of {table.replace('.', ' ')} swings at {frequencies.min():.2g} Hz on its spring: "
-                "were kilonewtons per metre meant?"
-            )
 
 
 def _silent(plan: Plan) -> Iterator[str]:
@@ -138,7 +120,7 @@ def _braking(plan: Plan) -> Iterator[str]:
     if number < 0 or (asked and told_of(plan.base, of_loads=True)):
         return
     tie = plan.base.carriages[number]
-    remedy = "frames take it with inertia_along = true"
+    remedy = "frames take it with inertia_along = true, and track.offset where it stands beside the axis"
     if "along" in could.get(tie.name, ()):
         remedy = f"{study.source.written(f'carriage.{tie.name}')}.inertia_along = true brings it"
     elif study.carriage[tie.name].riding_body is not None:
@@ -258,7 +240,11 @@ def _racing(plan: Plan) -> Iterator[str]:
 
 
 def _heavy(plan: Plan) -> Iterator[str]:
-    ratios = [moving_mass(g.scene, g.values, number).max() / body.mass for g, number, body in _carriages(plan)]
+    ratios = [
+        moving_mass(g.scene, g.values, number).max() / body.mass
+        for g, number, body in _carriages(plan)
+        if not _weighs_with_unit(plan.study, g.scene.carriages[number].name)
+    ]
     worst = max(ratios, default=0.0)
     if worst > HEAVY:
         yield f"a carriage weighs up to {worst:.3g} times its body: are the units right?"
@@ -309,17 +295,6 @@ def _weighs_with_unit(study: Study, carriage: str) -> bool:
     """Whether anything that makes the weight of a carriage is written with a unit."""
     own, table = study.carriage[carriage], study.source.written(f"carriage.{carriage}")
     return any(has_unit(study, f"{table}.{key}") for key in (*own.masses, *own.forces))
-
-
-def has_unit(study: Study, path: str) -> bool:
-    """Whether the values of a dotted key, those of a sweep where it is swept, are written with a unit."""
-    swept = [axis.values or (axis.from_, axis.to) for axis in study.sweep.axes.values() if path in axis.of]
-    try:
-        own = value_at(study.data, path.split("."))
-    except KeyError:  # left out
-        own = None
-    values = (value for part in swept or [own] for value in (part if isinstance(part, list | tuple) else [part]))
-    return any(isinstance(value, str) for value in values)
 
 
 def _newtons(force: float) -> str:
@@ -384,7 +359,8 @@ REMARKS = (
     _racing,
     _heavy,
     _light,
-    _slow,
+    swings_slowly,
+    does_not_swing,
     _silent,
     _reads_nothing,
     _between_places,

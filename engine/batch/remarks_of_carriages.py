@@ -1,16 +1,24 @@
 """Remarks of carriages: swept limits of motions that some variants do not reach, wheels that stay level, runs that end
-with a train, loads that vanish on their way or point up; and bands of settling that are no band."""
+with a train, loads that vanish on their way or point up, masses that hardly swing on their springs; and bands of
+settling that are no band."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from engine.batch.plan import Plan
+from engine.scene.study import Study
+from engine.scene.variants import SpringKeys
+from engine.study_file.refusals import value_at
+from results_schema.arrays import Array
 
 IN_A_ROW = 3  # axles: two excite little more than one
 RINGS = 5.0  # first periods after a train: of two spans 3.4 m/s2 were seen after one of them, 3.9 after five
 SHORT = 0.5  # of the length of the body: a way of a load that passes; cranes' are nine tenths of theirs
 WIDE = 0.1  # of the length: a band within which everything has settled
+SLOW = 0.1  # Hz, of a mass on its spring: vehicles swing at 0.5 to 20 Hz, and at a thirtieth of that on N/m for kN/m
 BELOW = 1e-9  # relative: a limit that is missed by more is not reached
 
 
@@ -100,3 +108,50 @@ def has_no_band(plan: Plan) -> Iterator[str]:
                     f"settling_band of sensor {name}, {sensor.settling_band:g} m, is more than a tenth of {part.name}: "
                     "was a smaller unit meant?"
                 )
+
+
+def sprung(plan: Plan) -> dict[str, tuple[Array, Array]]:
+    """The smallest and largest natural frequencies (Hz) and damping ratios of masses on their springs, of each scene,
+    by the tables that describe them."""
+    found: dict[str, list[list[float]]] = {}
+    for grid in plan.grids:
+        for name in (name for name, one in plan.study.carriage.items() if one.suspension is not None):
+            keys = SpringKeys.of_carriage(name)
+            own = (grid.values.columns.get(key, grid.values.study.value(key)) for key in keys)  # few are swept
+            stiffness, damping, mass = map(np.asarray, own)
+            omega = np.sqrt(stiffness / mass)
+            parts = omega / (2.0 * np.pi), damping / (2.0 * mass * omega)
+            ends = [end() for part in parts for end in (part.min, part.max)]
+            found.setdefault(plan.study.source.written(f"carriage.{name}"), []).append(ends)
+    return {table: (np.array(own)[:, :2], np.array(own)[:, 2:]) for table, own in found.items()}
+
+
+def swings_slowly(plan: Plan) -> Iterator[str]:
+    """One sentence for every mass on a spring that is far too soft."""
+    for table, (frequencies, _) in sprung(plan).items():
+        if frequencies.min() < SLOW and not has_unit(plan.study, f"{table}.stiffness"):
+            yield (
+                f"the sprung mass of {table.replace('.', ' ')} swings at {frequencies.min():.2g} Hz on its spring: "
+                "were kilonewtons per metre meant?"
+            )
+
+
+def does_not_swing(plan: Plan) -> Iterator[str]:
+    """One sentence for every mass on a spring that is damped beyond swinging."""
+    for table, (frequencies, ratios) in sprung(plan).items():
+        if ratios.max() > 1.0:
+            yield (
+                f"the sprung mass of {table.replace('.', ' ')}, of {frequencies.max():.3g} Hz on its spring, is damped "
+                f"by up to {ratios.max():.3g} times what lets it swing: is its mass right, in kg?"
+            )
+
+
+def has_unit(study: Study, path: str) -> bool:
+    """Whether the values of a dotted key, those of a sweep where it is swept, are written with a unit."""
+    swept = [axis.values or (axis.from_, axis.to) for axis in study.sweep.axes.values() if path in axis.of]
+    try:
+        own = value_at(study.data, path.split("."))
+    except KeyError:  # left out
+        own = None
+    values = (value for part in swept or [own] for value in (part if isinstance(part, list | tuple) else [part]))
+    return any(isinstance(value, str) for value in values)

@@ -199,7 +199,9 @@ def _named_by_pint(name: str) -> tuple[Fraction, Mapping[str, int]]:
     if name.casefold() in ("ton", "tons"):  # which pint takes for 907 kg
         raise fault("a ton is one of several sizes", expected='"t" (1,000 kg) or "kg"', received=shortened(name))
     if name.endswith("s") and name not in _COMMON and name[:-1] in _COMMON:  # which pint takes for a plural
-        raise fault("no such unit", expected=KNOWN_UNITS, received=shortened(name), remedy=_meant(name[:-1]))
+        of_damper = name[:-1] in ("N", "kN", "MN")
+        remedy = f'did you mean "{name[:-1]} s"?' if of_damper else _meant(name[:-1])
+        raise fault("no such unit", expected=KNOWN_UNITS, received=shortened(name), remedy=remedy)
     try:
         quantity = _registry().Quantity(Fraction(1), name).to_base_units()
     except (PintError, TypeError, ValueError, AssertionError):
@@ -228,6 +230,10 @@ def _meant_here(number: str, unit: str, wanted: Unit, exponents: tuple[int, int,
     other = re.sub(r"[A-Za-z]+", lambda name: known.get(name[0].casefold(), name[0]), unit)
     if other != unit and _unit_factor(other)[1] == wanted.exponents:
         return f'did you mean "{number} {other}"?'
+    for power in "234":  # of the last part: cm2 for cm4, m/s2 for m/s3
+        other = re.sub(r"\^?[234]$", power, unit)
+        if other != unit and _unit_factor(other)[1] == wanted.exponents:
+            return f'did you mean "{number} {other}"?'
     if unit == "g" and wanted.noun == "acceleration":
         return f'g is gram; {number} g of gravity is "{float(number) * 9.81:.3g} m/s2"'
     if wanted.noun == "density" and exponents == (-1, 1, 0):

@@ -12,7 +12,7 @@ from engine.accuracy.grids import SceneGrid
 from engine.batch.audit import audit_size
 from engine.batch.dataset import model_groups
 from engine.batch.plan import Plan
-from engine.batch.plausibility import sprung
+from engine.batch.remarks_of_carriages import sprung
 from engine.model.distinct_models import base_scene
 from engine.model.lane_table import moving_mass, weight
 from engine.model.scene_model import SceneModel

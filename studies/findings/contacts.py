@@ -38,7 +38,9 @@ def told_uplift(results: Results, sensor: str, of: Sequence[str]) -> str:
     said = f" It pulls by up to {_pull(results, sensor)}{weight}." if _pulls(results, sensor) else ""
     if sensor != next(name for name in of if name in least):
         return said
-    others = sorted((one for one in least if one not in of and _pulls(results, one)), key=lambda one: least[one])
+    most = min(least, key=lambda one: least[one])  # told at once, though it may have a sentence of its own further on
+    others = [one for one in least if _pulls(results, one) and one != sensor and (one not in of or one == most)]
+    others.sort(key=lambda one: least[one])
     if others:
         first, *rest = [f"by up to {_pull(results, one)}" for one in others[:MOST_TOLD]]
         words = [f"{others[0]} pulls {first}", *(f"{one} {by}" for one, by in zip(others[1:], rest, strict=False))]

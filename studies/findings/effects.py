@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,9 +13,11 @@ from studies.results.axes import DIRECTION, VARIANT, Axis
 from studies.results.formatting import ALIKE, listed, number, percent, quantity
 from studies.results.results import Results
 
-MOST_AXES = 4
+MOST_AXES = 4  # whose spans are told in one breath
+MOST_EFFECTS = 6  # swept numbers, of which it is told what each does
 MOST_EACH = 4  # values of a swept number for each of which the largest is told
 HARDLY = 0.005  # of the smallest value: what no figure shows
+LEAST_APART = 0.01  # of the larger of two ways, which differ by more
 TIMES = 1.5  # the largest over the smallest from which on it is told how many times, else by how many percent
 HALVED = 2.0  # the same of what falls
 
@@ -56,17 +59,20 @@ def by_effect(results: Results, values: Array) -> list[Axis]:
 
 
 def told_effects(results: Results, values: Array, what: str, error: Array | float = 0.0) -> str:
-    """How the largest of positive values (in the sweep's shape) over all other swept numbers changes along each; ""
+    """How the largest of positive values (in the sweep's shape) over all other swept numbers changes along each, that
+    first along which it changes most; ""
     without several numbers on a grid, or where any variant does not count: what is largest is not known then. error: of
     the values, within which a change may be none."""
     axes = [axis for axis in results.axes if len(axis.values) > 1]
     known = np.where(results.with_values, values, np.nan)
-    if not 2 <= len(axes) <= MOST_AXES or VARIANT in results.dims or not np.isfinite(known).all():
+    if not 2 <= len(axes) <= MOST_EFFECTS or VARIANT in results.dims or not np.isfinite(known).all():
         return ""
     doubt = np.broadcast_to(np.nan_to_num(error), known.shape)
     lines = {axis: _worst(results, axis, known, doubt) for axis in axes}
     own = [axis for axis in axes if not axis.sets(DIRECTION)]  # which `told_both_ways` tells
-    told = [_effect(axis, *lines[axis]) for axis in own if (lines[axis][0] > 0.0).all()]
+    own = [axis for axis in own if (lines[axis][0] > 0.0).all()]
+    own.sort(key=lambda axis: -float(lines[axis][0].max() / lines[axis][0].min()))
+    told = [_effect(axis, *lines[axis]) for axis in own]
     return f"Over all else that is swept, {what} {listed(told)}." if told else ""
 
 
@@ -91,32 +97,62 @@ def told_for_each(results: Results, values: Array, units: str) -> str:
     return f" For each {few.noun} it is largest with {listed(told)}." if len(tops) > 1 else ""
 
 
-def told_both_ways(results: Results, values: Array, what: str, units: str, error: Array | float = 0.0) -> str:
-    """Whether positive values (in the sweep's shape) are the same forward and backward, and where they differ most, as
-    a sentence behind another; "" where the direction of a motion is not swept. error: of the values."""
+class BothWays(NamedTuple):
+    """Values forward and backward where they differ most, and where that is; part: by how much of the larger one, and
+    whether that is more than their errors anywhere."""
+
+    forward: float
+    backward: float
+    at: str
+    part: float
+    beyond_errors: bool
+
+    @property
+    def differs(self) -> bool:
+        """By more than is of any interest, and than is doubtful."""
+        return self.beyond_errors and self.part > LEAST_APART
+
+    def words(self, units: str) -> str:
+        """Both values, and where."""
+        where = f" at {self.at}" if self.at else ""
+        return f"{quantity(self.forward, units)} forward, {quantity(self.backward, units)} backward{where}"
+
+
+def both_ways(results: Results, values: Array, error: Array | float = 0.0) -> BothWays | None:
+    """Positive values (in the sweep's shape) in both directions of a motion where these differ most; None where no
+    direction is swept, or nothing is known. error: of the values."""
     axis = next((axis for axis in results.axes if axis.sets(DIRECTION) and axis.values.size > 1), None)
     if axis is None or axis.dim == VARIANT:
-        return ""
+        return None
     order, rest = np.argsort(-axis.values), [dim for dim in results.dims if dim != axis.dim]
     known, doubt = np.where(results.with_values, values, np.nan), np.broadcast_to(np.nan_to_num(error), values.shape)
     pairs, doubts = (np.moveaxis(one, results.dims.index(axis.dim), 0)[order] for one in (known, doubt))
     apart = np.abs(pairs[0] - pairs[1])
     if not np.isfinite(apart).any():
-        return ""
-    if np.nanmax(apart) <= ALIKE * np.nanmax(pairs):
-        return f" Forward and backward {what} is the same."
-    if not (apart > doubts.sum(axis=0)).any():
-        return f" Forward and backward {what} is the same within its estimated error."
+        return None
     flat = int(np.nanargmax(apart))
     worst = dict(zip(rest, map(int, np.unravel_index(flat, apart.shape)), strict=True))
     others = [other for other in results.axes if other is not axis and other.values.size > 1]
-    at = ", ".join(other.at(worst[other.dim]) for other in others)
-    pair = pairs.reshape(2, -1)[:, flat]
-    forward, backward = (quantity(float(value), units) for value in pair)
-    if forward == backward:
-        most = percent(float(np.ptp(pair) / pair.max()))
-        return f" Forward and backward {what} hardly differs: by at most {most}{at and f', at {at}'}."
-    return f" Forward and backward {what} differs{at and f' most at {at}'}: {forward} forward, {backward} backward."
+    forward, backward = pairs.reshape(2, -1)[:, flat].tolist()
+    part = abs(forward - backward) / max(forward, backward) if forward != backward else 0.0
+    beyond = bool((apart > doubts.sum(axis=0)).any())
+    return BothWays(forward, backward, ", ".join(other.at(worst[other.dim]) for other in others), part, beyond)
+
+
+def told_both_ways(results: Results, values: Array, what: str, units: str, error: Array | float = 0.0) -> str:
+    """Whether positive values are the same forward and backward, and where they differ most, as a sentence behind
+    another; "" where `both_ways` finds nothing."""
+    found = both_ways(results, values, error)
+    if found is None:
+        return ""
+    if found.part <= ALIKE:
+        return f" Forward and backward {what} is the same."
+    if not found.beyond_errors:
+        return f" Forward and backward {what} is the same within its estimated error."
+    at = found.at and f" at {found.at}"
+    if quantity(found.forward, units) == quantity(found.backward, units):
+        return f" Forward and backward {what} hardly differs: by at most {percent(found.part)}{at and f',{at}'}."
+    return f" Forward and backward {what} differs{at and f' most{at}'}: {found._replace(at='').words(units)}."
 
 
 def _worst(results: Results, axis: Axis, values: Array, error: Array) -> tuple[Array, Array]:

@@ -1,5 +1,9 @@
 """How far sensors swing about their static values after all carriages have come to rest or left, in sentences."""
 
+from collections.abc import Sequence
+from itertools import product
+from math import prod
+
 import numpy as np
 
 from engine.march.rest import names_of_times, settling
@@ -8,8 +12,8 @@ from results_schema.arrays import Array, Mask
 from studies.findings.absolute_errors import absolute_errors, told_error
 from studies.findings.amplification import only_rounding, sizes
 from studies.findings.beyond import LIMITED, AskedOfRest, Limits, in_turns, out_of_reach, where_beyond
-from studies.findings.effects import by_effect, told_both_ways
-from studies.results.axes import VARIANT, Axis
+from studies.findings.effects import by_effect, told_both_ways, told_effects
+from studies.results.axes import DIRECTION, VARIANT, Axis
 from studies.results.findings_common import in_words
 from studies.results.formatting import ROUNDING, counted, listed, quantity
 from studies.results.places import Index, chosen, extreme
@@ -76,7 +80,13 @@ def has_whole(results: Results, name: str) -> bool:
 
 def residuals(results: Results, asked: AskedOfRest) -> list[str]:
     """The largest residual vibration of sensors, and where limits are exceeded."""
-    return [_residual(results, sensor, asked) for sensor in ringing(results, asked.residual)[:MOST_SENSORS]]
+    sensors = ringing(results, asked.residual)[:MOST_SENSORS]
+    said = [_residual(results, sensor, asked) for sensor in sensors]
+    if sensors and not quiet(results, sensors[0]):
+        doubt = absolute_errors(results, f"{sensors[0]}_residual")
+        effects = told_effects(results, residual_of(results, sensors[0]), "the largest such swing", doubt)
+        said[0] += f" {effects}" if effects else ""
+    return said
 
 
 def most_ringing(results: Results) -> list[Index]:
@@ -164,30 +174,33 @@ def _not_settled(results: Results, left: Mask, axis: Axis | None) -> str:
 
 
 def _shortest(results: Results, sensor: str) -> str:
-    """The shortest time of move and settling: for every value of the one swept number that is none of the motion's."""
+    """The shortest time of move and settling: for each of a few values of what is none of the motion's to choose, such
+    as the mass or the way, at the worst of what else that is."""
     values = settling_of(results, names_of_times(sensor)[1])
-    others = [
-        axis for axis in results.axes if axis.values.size > 1 and not any(".motion." in one for one in axis.paths)
-    ]
-    if VARIANT in results.dims or len(others) != 1:
+    given = [axis for axis in by_effect(results, values) if axis.sets(DIRECTION) or not axis.sets_motion]
+    given.sort(key=lambda axis: axis.values.size)  # so that as many as can be are told
+    if VARIANT in results.dims or not given:
         return f"move and settling take {_least(results, sensor, values, ' at least')}"
-    (axis,), rows = others, list[str]()
-    own = results.everywhere(results.dataset[axis.name])
-    for value in chosen(np.sort(axis.values).tolist(), MOST_BEST):
-        if np.isfinite(among := np.where(own == value, values, np.nan)).any():
-            rows.append(f"{_least(results, sensor, among, known=axis)} ({axis.noun} {axis.in_words(value)})")
-    return f"move and settling take at least {listed(rows)}"
+    each = given[: max(1, sum(prod(a.values.size for a in given[: n + 1]) <= MOST_BEST for n in range(len(given))))]
+    rest = tuple(results.dims.index(axis.dim) for axis in given[len(each) :])
+    longest = np.where(np.isnan(values), np.inf, values).max(axis=rest, keepdims=True)
+    values, rows = np.where((values == longest) & np.isfinite(longest), values, np.nan), list[str]()
+    for own in product(*(chosen(np.sort(axis.values).tolist(), MOST_BEST) for axis in each)):
+        pairs = list(zip(each, own, strict=True))
+        here = [results.everywhere(results.dataset[axis.name]) == value for axis, value in pairs]
+        if np.isfinite(among := np.where(np.all(here, axis=0), values, np.nan)).any():
+            where = ", ".join(f"{axis.noun} {axis.in_words(value)}" for axis, value in pairs)
+            rows.append(f"{_least(results, sensor, among, known=given)} ({where})")
+    whatever = f", whatever {listed([axis.noun for axis in given[len(each) :]])}" if rest else ""
+    return f"move and settling take at least {listed(rows)}{whatever}" if rows else "none settles in all of these"
 
 
-def _least(results: Results, sensor: str, values: Array, words: str = "", known: Axis | None = None) -> str:
-    """The smallest of times with its error, words, and where in the sweep it is, of which one number may be known."""
+def _least(results: Results, sensor: str, values: Array, words: str = "", known: Sequence[Axis] = ()) -> str:
+    """The smallest of times with its error, words, and where in the sweep it is, of which some numbers are known."""
     place = extreme(-values)
     assert place is not None
     took, error = float(values[place]), float(absolute_errors(results, names_of_times(sensor)[1])[place])
-    axes = [axis for axis in results.axes if axis.values.size > 1 and axis is not known]
-    where = (
-        in_words(results, place)
-        if known is None
-        else f" at {', '.join(axis.at(place[results.dims.index(axis.dim)]) for axis in axes)}"
-    )
+    names = {axis.name for axis in known}
+    axes = [axis for axis in results.axes if axis.values.size > 1 and axis.name not in names]
+    where = f" at {', '.join(axis.at(place[results.dims.index(axis.dim)]) for axis in axes)}" if axes else ""
     return f"{quantity(took, 's')}{told_error(error, took, 's')}{words}{where}"

@@ -31,7 +31,15 @@ from studies.findings.beyond import (
     where_beyond,
 )
 from studies.findings.contacts import told_contacts, told_uplift
-from studies.findings.effects import by_effect, hardly_changed, told_both_ways, told_effects, told_for_each, unchanged
+from studies.findings.effects import (
+    both_ways,
+    by_effect,
+    hardly_changed,
+    told_both_ways,
+    told_effects,
+    told_for_each,
+    unchanged,
+)
 from studies.findings.envelopes import beyond_sensors, sizes_along, told_along
 from studies.findings.in_step import told_between_speeds
 from studies.findings.residual import check_residual, most_ringing, residuals
@@ -51,7 +59,10 @@ from studies.results.results import Results
 
 MOST_SENSORS = 6
 #: A table whose tool is 15 um off its static way is told an amplification of 1.01.
-OF_LARGEST = 'It compares largest values; a sensor with part = "dynamic" reads how far it is from statics on the way.'
+OF_LARGEST = (
+    'It compares largest values; a sensor with part = "dynamic" reads how far it is from statics on the way, and what '
+    "has the other sign, such as an uplift, may be amplified more."
+)
 
 declare("passage", *MARCH, DYNAMIC_AMPLIFICATION)
 
@@ -88,7 +99,9 @@ class Passage(Kind):
         ]
         said = _once(OF_LARGEST, _with_remark(said, told_between_speeds(results)))
         if sensors:  # of which those after the first may be cut
-            said[len(envelopes)] += _limited_besides(results, sensors[0]) + _amplified_besides(results, sensors[0])
+            first = sensors[0]
+            besides = _limited_besides(results, first) + _amplified_besides(results, first)
+            said[len(envelopes)] += besides + _ways_besides(results, first)
         said[0] += _effects(results, envelopes, sensors)
         lifted, kept = told_contacts(results)
         residual = residuals(results, question_of(results.study, AskedOfPassages))
@@ -229,6 +242,18 @@ def _limited_besides(results: Results, told: str) -> str:
     words += [f"{len(order) - MOST_TOLD} more"] * (len(order) > MOST_TOLD)
     exceed = "exceeds its limit" if len(order) == 1 else "exceed their limits"
     return f" Of the other sensors {listed(words)} {exceed}."
+
+
+def _ways_besides(results: Results, told: str) -> str:
+    """Of which sensors besides that one the largest value differs most forward and backward."""
+    others = [name for name in results.sensors if name != told and not only_rounding(results, name)]
+    found = {name: both_ways(results, sizes(results, name), errors_of_size(results, name)) for name in others}
+    known = [(name, ways) for name, ways in found.items() if ways is not None and ways.differs]
+    known.sort(key=lambda one: -one[1].part)
+    said = [ways if n == 0 else ways._replace(at="") for n, (_, ways) in enumerate(known[:MOST_TOLD])]
+    words = [f"{name} ({ways.words(results.sensors[name])})" for (name, _), ways in zip(known, said, strict=False)]
+    words += [f"{len(known) - MOST_TOLD} more by less"] * (len(known) > MOST_TOLD)
+    return f" Of the other sensors the largest values differ forward and backward of {listed(words)}." if words else ""
 
 
 def _once(remark: str, said: list[str]) -> list[str]:

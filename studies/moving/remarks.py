@@ -148,7 +148,7 @@ def _carries(study: Study, name: str) -> bool:
 
 def _degrees(looked: Looked) -> Iterator[str]:
     """Angles of frames that are whole numbers of radians beyond half a turn, and written without a unit."""
-    from engine.batch.plausibility import has_unit
+    from engine.batch.remarks_of_carriages import has_unit
 
     study = looked.study
     swept = {path: axis.values for axis in looked.cases.axes for path in axis.paths}

@@ -20,6 +20,11 @@ PACES = (".motion.frequency", ".motion.speed")
 DIRECTION = ".motion.direction"
 
 
+def direction_in_words(value: float) -> str:
+    """What a swept direction of a motion is called."""
+    return "forward" if value > 0.0 else "backward"
+
+
 @dataclass(frozen=True, eq=False)
 class Axis:
     """One swept number: its dimension in the dataset, and its values (n,) along it, in SI units.
@@ -73,7 +78,7 @@ class Axis:
     def in_words(self, value: float) -> str:
         """A value (SI) with its unit, or what it stands for."""
         if self.sets(DIRECTION):
-            return "forward" if value > 0.0 else "backward"
+            return direction_in_words(value)
         return swept_quantity(value, self.units, self.typed)
 
     @property
@@ -95,6 +100,11 @@ class Axis:
     def at(self, index: int) -> str:
         """One value with name and unit."""
         return f"{self.noun} {self.value(index)}"
+
+    @property
+    def sets_motion(self) -> bool:
+        """Whether it sets a number of a motion."""
+        return any(".motion." in path for path in self.paths)
 
     def sets(self, *endings: str) -> bool:
         """Whether one of the keys that it sets ends so."""

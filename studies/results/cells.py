@@ -10,6 +10,7 @@ import numpy as np
 from results_schema.arrays import Array
 from results_schema.lazy_imports import xr
 from results_schema.status import Status
+from studies.results.axes import DIRECTION, direction_in_words
 from studies.results.formatting import swept_quantity, typed_unit
 
 if TYPE_CHECKING:
@@ -110,6 +111,9 @@ def words_of(results: Results, values: Mapping[str, float]) -> dict[str, str]:
     """Swept numbers of one variant, by the names of their axes, in words."""
     found = {}
     for name, value in values.items():
-        unit = results.study.unit(results.study.sweep.axes[name].of[0])
+        path = results.study.sweep.axes[name].of[0]
+        unit = results.study.unit(path)
         found[name] = swept_quantity(value, unit.symbol if unit else "1", typed_unit(results.study, name))
+        if path.endswith(DIRECTION):
+            found[name] = direction_in_words(value)
     return found

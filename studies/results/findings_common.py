@@ -172,5 +172,5 @@ def told_statuses(results: Results) -> list[str]:
     others = sum(count for status, count in results.status_counts.items() if status != Status.OK)
     if not others:
         return []
-    carried = f"{others:,} carry a status: {statuses(results.status_counts)}"
+    carried = f"{others:,} {'carry' if others > 1 else 'carries'} a status: {statuses(results.status_counts)}"
     return [f"Of {counted(results.variants, 'variant')}, {carried}.{remedy(results)}"]

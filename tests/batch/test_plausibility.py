@@ -104,6 +104,9 @@ CASES = {
     "carriage car is gone from 0.3 m on, where its cruise ends on a body of 1 m": passing(
         car=mass(0.1, cruise(0.0, 0.3, 0.5))
     ),
+    "1.01 Hz on its spring, is damped by up to 3.16 times what lets it swing: is its mass right": passing(
+        car=oscillator(1.0, 40.0, WAY, damping=40.0)
+    ),
     "the force of carriage car is negative, so that it lifts: weights are positive": passing(car=force(-0.1, WAY)),
     "settling_band of sensor place, 20 m, is more than a tenth of bed: was a smaller unit meant?": passing(
         car=mass(0.1, STOP), output={"residual": True}, sensor={"place": fixed(0.4) | {"settling_band": 20.0}}

@@ -31,6 +31,12 @@ MISTAKES = {
     "second moment in mm4": (
         OTHER.replace("= 1e-6", "= 1e6"), 2, ["body.beam.second_moment", "no beam has this", '"1e+06 mm^4"'],
     ),
+    "a damper's unit run together": (
+        OTHER.replace("= 1e9", '= "9 kNs/m"'), 2, ["no such unit", 'did you mean "kN s"?'],
+    ),
+    "the second moment in another power": (
+        OTHER.replace("= 1e-6", '= "1128 cm2"'), 2, ["where a second moment", 'did you mean "1128 cm4"?'],
+    ),
     "a plural of a symbol": (OTHER.replace("= 1e9", '= "9 GPas"'), 2, ["no such unit", 'did you mean "GPa"?']),
     "a limit of what nothing reads": (
         SMALL + '[question]\nstress = "100 MPa"\n',

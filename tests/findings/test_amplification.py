@@ -8,6 +8,7 @@ import studies
 from engine.scene.study import Study, load
 from studies.commands import screens
 from studies.findings.amplification import sizes, with_derived_errors
+from studies.findings.contacts import told_uplift
 from studies.protocol.study import kind_of
 from studies.reporting import answers, summary
 from studies.results.formatting import quantity
@@ -167,6 +168,29 @@ def test_supports_that_pull_are_told_though_others_press_more() -> None:
     assert (
         f"No support lifts: the smallest reaction{of} is {quantity(float(heavy[f'{lowest}_min'].min()), 'N')}" in told
     )
+
+
+def test_the_support_that_pulls_most_is_told_with_the_first_of_them() -> None:
+    """Though it has a sentence of its own further on, which short answers leave out."""
+    found = studies.run(supported(0.4, 0.8, own_weight=False))
+    results, names = Results.of(found), ("left", "middle", "right")
+    least = {name: float(found[f"{name}_min"].min()) for name in names}
+    most = min(names, key=lambda name: least[name])
+    first = next(name for name in names if name != most)
+    said = told_uplift(results, first, [first, most])
+    assert f"Of the other supports {most} pulls by up to {quantity(-least[most], 'N')}" in said
+
+
+def test_sensors_that_differ_in_both_directions_are_told_beside_the_first() -> None:
+    """Midspan of a symmetric beam reads the same; what stands beside it does not."""
+    sensors = {"midspan": fixed(0.5), "quarter": fixed(0.25), "end": fixed(0.0, "support_reaction")}
+    way = {"way": {"of": "carriage.car.motion.direction", "values": ["forward", "backward"]}}
+    found = studies.run(built(beam(), force(0.5, cruise(0.0, 1.0, 0.6)), sensor=sensors, sweep=way))
+    told = answers.answer(found)[0]
+    ends = found["end_max"].values
+    assert found.midspan_max[0] == pytest.approx(float(found.midspan_max[1]), rel=1e-3)
+    assert "the largest values differ forward and backward of " in told
+    assert f"end ({quantity(float(ends[0]), 'N')} forward, {quantity(float(ends[1]), 'N')} backward)" in told
 
 
 def test_a_remark_stands_once_in_an_answer() -> None:

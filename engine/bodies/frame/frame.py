@@ -68,7 +68,8 @@ _ZERO = (0.0, 0.0, 0.0)
 
 _DirectionWord = Annotated[str, AfterValidator(one_of(*DIRECTIONS))]
 _Directions = Annotated[Several[_DirectionWord], Field(min_length=1, max_length=6), AfterValidator(distinct)]
-_MEANT = {"fixed": "clamped", "hinged": "pinned", "roller": '["z"]'}
+_MEANT = {"fixed": "clamped", "hinged": "pinned"}
+_MEANT |= dict.fromkeys(("roller", "rolled", "rolling", "sliding", "guided"), '["z"]')
 _HoldWord = Annotated[str, AfterValidator(one_of(*HELD_AT, meant=_MEANT))]
 Support = Annotated[Annotated[_HoldWord, Tag(WORD)] | Annotated[_Directions, Tag(LIST)], by_form]
 
