@@ -43,8 +43,8 @@ BAND = 0.3  # of their colour that bands have together
 
 class Row(NamedTuple):
     """A panel over the sweep: values and estimated errors in the sweep's shape, their unit, what stands beside the axis
-    in a unit, a limit of the values, where the axis begins (None: where they do), and what the smallest value is called
-    where it is looked for."""
+    in a unit, a limit of the values, where the axis begins (None: where they do), what the smallest value is called
+    where it is looked for, and what no value can be less than, whatever its error."""
 
     sensor: str
     values: Array
@@ -54,6 +54,7 @@ class Row(NamedTuple):
     limit: float | None = None
     base: float | None = 0.0
     best: str = ""
+    least: Array | float = 0.0
 
 
 def pictures(results: Results, asked: AskedOfRest) -> list[Figure]:
@@ -103,9 +104,10 @@ def _settling(results: Results, sensors: list[str], asked: AskedOfRest) -> list[
     for sensor in told:
         name = names_of_times(sensor)[with_move]
         limit, base = (None, None) if with_move else (asked.settling_time, 0.0)
-        errors = absolute_errors(results, name)
+        errors, values = absolute_errors(results, name), settling_of(results, name)
         best = "the shortest" if with_move else ""
-        rows.append(Row(sensor, settling_of(results, name), errors, "s", label.format, limit, base, best))
+        stop = values - settling_of(results, names_of_times(sensor)[0])
+        rows.append(Row(sensor, values, errors, "s", label.format, limit, base, best, stop))
         bands.append(f"{sensor.replace('_', ' ')} {quantity(float(known[sensor].settling_band or 0.0), 'm')}")
     longest, least = (quantity(float(end(rows[0].values)), "s") for end in (np.nanmax, np.nanmin))
     caption = (
@@ -174,18 +176,19 @@ def _draw_row(axes: Axes, seen: View, row: Row) -> None:
     largest = float(np.nanmax(seen.plane(like.copy(data=row.values)), initial=0.0))
     scale = scale_for(largest, row.units)
     curves = seen.curves(like.copy(data=row.values * scale.factor))
-    bounds = [curve.y for curve in seen.curves(like.copy(data=row.errors * scale.factor))]
+    below = np.minimum(row.errors, row.values - row.least)
+    bounds = [[one.y for one in seen.curves(like.copy(data=off * scale.factor))] for off in (below, row.errors)]
     draw_curves(axes, seen, curves)
-    bands = list(zip(curves, bounds, shades(len(curves)), strict=True))
+    bands = list(zip(curves, *bounds, shades(len(curves)), strict=True))
     if seen.y is not None and coincide(curves):
-        bands = [(curves[-1], bounds[-1], BLUE)]
-    for curve, off, colour in bands:
+        bands = [(curves[-1], bounds[0][-1], bounds[1][-1], BLUE)]
+    for curve, low, off, colour in bands:
         if _has_bars(seen):
-            at = seen.points
-            axes.errorbar(curve.x[at], curve.y[at], off[at], fmt="none", ecolor=colour, alpha=0.5, linewidth=0.7)
+            at, ends = seen.points, np.stack([low, off])
+            axes.errorbar(curve.x[at], curve.y[at], ends[:, at], fmt="none", ecolor=colour, alpha=0.5, linewidth=0.7)
         elif not seen.is_sampled:
             axes.fill_between(
-                curve.x, curve.y - off, curve.y + off, color=colour, alpha=BAND / len(bands), linewidth=0.0
+                curve.x, curve.y - low, curve.y + off, color=colour, alpha=BAND / len(bands), linewidth=0.0
             )
     axes.set_ylabel(row.label(scale.unit))
     axes.set_title(row.sensor.replace("_", " "))
