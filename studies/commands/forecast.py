@@ -139,7 +139,8 @@ def _without_pilots(plan: Plan, looked: Looked, threads: int, tried: float) -> F
     """A study whose pilots take longer than there is time; tried: seconds after which the first of them, of one scene
     or of a few, were broken off, 0 where there was no time to begin."""
     pilots = pilots_of(plan.cases, plan.members).size
-    less = f"there was no time for pilots: a run measures {pilots}, and takes what they show to be enough"
+    first = f"pilots, variants that are measured first: a run has {pilots} of them"
+    less = f"there was no time for {first}, and takes what they show to be enough"
     scenes = scenes_of_pilots(len(plan.grids), plan.size, usual_pilots(plan.size))
     few = scenes_of_pilots(len(plan.grids), plan.size, FIRST)
     seconds = max(BROKEN_OFF * tried * scenes / few, CLIMB * looked.seconds * scenes / min(threads, scenes))
