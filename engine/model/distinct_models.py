@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from engine.bodies.modal.description import MAX_MODES
 from engine.model.scene_model import SceneModel, build_model
 from engine.scene.study import Study
 from engine.scene.sweep import Cases
@@ -17,7 +18,7 @@ def scenes(study: Study, cases: Cases, chosen: Counts) -> Iterator[tuple[SceneMo
     """Distinct scenes of some variants, given by their flat numbers, with those that share each."""
     base = study.without_sweep()
     for variants in split(chosen, structure(study, cases, chosen)):
-        own = cases.study_of(base, int(variants[0])) if structural(study, cases) else base
+        own = cases.study_of(base, int(variants[0])) if structural(study, cases) or _limited(study) else base
         values = VariantValues.of(own, cases, variants)
         timing = values.timing()
         columns = np.stack([column for pair in timing.values() for column in pair])
@@ -45,11 +46,36 @@ def _timing_of(values: VariantValues, lane: int) -> tuple[dict[str, float], dict
 
 
 def structure(study: Study, cases: Cases, variants: Counts) -> Counts:
-    """(V,) number of the scene that each variant has, by the dimensions that change it; nothing is built."""
+    """(V,) number of the scene that each variant has, by the dimensions that change it, and the modes that it reads."""
     positions = cases.positions(variants)
     dims = {axis.dim for axis in cases.axes if set(axis.paths) & set(structural(study, cases))}
     code = np.zeros(variants.size, dtype=np.int64)
     for dim, size in zip(cases.dims, cases.shape, strict=True):
         if dim in dims:
             code = code * size + positions[dim]
+    for within in _modes_within(study, cases, variants):
+        code = code * (MAX_MODES + 1) + within
     return code
+
+
+def _limited(study: Study) -> list[str]:
+    """The keys of frequency limits that sensors and envelopes have."""
+    readers = (("sensor", study.sensor), ("envelope", study.envelope))
+    return [
+        f"{table}.{name}.frequency_limit"
+        for table, named in readers
+        for name, one in named.items()
+        if one.frequency_limit is not None
+    ]
+
+
+def _modes_within(study: Study, cases: Cases, variants: Counts) -> Iterator[Counts]:
+    """For every frequency limit (V,) how many modes of variants lie within it: those that share a scene in units of
+    their own read as many."""
+    values = VariantValues.of(study, cases, variants)
+    if values.units is None or not (keys := _limited(study)):
+        return
+    (body,) = study.body.values()
+    omega = (body.with_modes(MAX_MODES) if body.modes_are_open else body).build().omega
+    for key in keys:
+        yield np.searchsorted(omega, 2.0 * np.pi * values.column(key), side="right")

@@ -32,10 +32,10 @@ class UnitKeys(NamedTuple):
 
     @classmethod
     def of(cls, study: Study) -> UnitKeys:
-        """None where anything else has a stiffness, a frequency or a course in time of its own."""
+        """None where anything else has a stiffness or a course in time of its own."""
         readers: list[Sensor | Envelope] = [*study.sensor.values(), *study.envelope.values()]
         others = (study.frame, study.load, study.spring, study.arm, study.robot)
-        if len(study.body) != 1 or any(others) or any(one.frequency_limit is not None for one in readers):
+        if len(study.body) != 1 or any(others):
             return cls()
         (name, body), *_ = study.body.items()
         by_fibre = any(one.reads.needs_fibre for one in readers)  # stress is M z/I

@@ -49,7 +49,7 @@ def small() -> Study:
     """48 variants of two scenes, a few of which keep histories."""
     sweep = {
         "weight": {"of": "carriage.car.mass", "from": 0.05, "to": 1.0, "count": 24},
-        "stiffness": {"of": "body.bed.youngs_modulus", "values": [1.0, 1.1]},
+        "length": {"of": "body.bed.length", "values": [1.0, 1.1]},
     }
     everything = {"steps": 100, "fidelity": "full", "scheme": "average-acceleration", "tolerance": 0.5}
     return study(

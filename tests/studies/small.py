@@ -48,11 +48,11 @@ SEPARATED = SMALL.replace("values = [0.1, 1.0]", "values = [0.1, 10.0]").replace
 # As many variants, of eight scenes, each of which is a chunk of its own.
 SCENES = SMALL.replace(
     'speed = { of = "carriage.trolley.motion.speed", from = 0.5, to = 10.0, count = 8, spacing = "log" }',
-    'density = { of = "body.beam.density", from = 1000.0, to = 1070.0, count = 8 }',
+    'length = { of = "body.beam.length", from = 1.0, to = 1.07, count = 8 }',
 )
 
 # Minutes of marching in many chunks: so many scenes that all their variants converge.
-LONG = SMALL.replace("[sweep]", '[sweep]\ndensity = { of = "body.beam.density", from = 1000, to = 1300, count = 300 }')
+LONG = SMALL.replace("[sweep]", '[sweep]\nlength = { of = "body.beam.length", from = 1.0, to = 1.3, count = 300 }')
 LONG = LONG.replace('steps = "auto"', "steps = 40000")
 
 
