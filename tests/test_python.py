@@ -154,3 +154,16 @@ def test_a_chunk_is_a_number_of_variants(run: Any, chunk: Any) -> None:
 def test_a_dict_is_no_file_and_a_number_no_key() -> None:
     assert "engine.Study(**tables) takes the tables of a dict" in refused(engine.load, {})
     assert "1: unknown key" in refused(scenes.study("passage").with_values, {1: 1})
+
+
+def test_an_archive_is_written_again_where_that_is_asked_for(tmp_path: Path) -> None:
+    """A cell of a notebook runs twice; nothing but an archive is replaced."""
+    dataset, path = scenes.run("passage"), tmp_path / "run.nc"
+    studies.write(dataset, path)
+    with pytest.raises(BadInput, match="there is a file already"):
+        studies.write(dataset, path)
+    before = path.stat().st_mtime_ns
+    assert studies.write(dataset, path, overwrite=True) == path and path.stat().st_mtime_ns > before
+    (tmp_path / "notes.nc").write_text("mine")
+    with pytest.raises(BadInput, match="no archive, and is never replaced"):
+        studies.write(dataset, tmp_path / "notes.nc", overwrite=True)

@@ -224,8 +224,8 @@ def _comes_close(results: Results, values: Array, limit: float, axis: Axis | Non
 
 
 def _where_alone(results: Results, values: Array, threshold: float, axis: Axis | None) -> str:
-    """The same along one swept number, whatever the others are."""
-    if axis is None or axis.dim == VARIANT:
+    """The same along one swept number, whatever the others are; of samples in which part of them."""
+    if axis is None or axis.dim == VARIANT or (VARIANT in results.dims and _has_samples(results, axis)):
         return where_beyond(results, values, threshold, axis)
     beyond = np.nan_to_num(np.where(results.with_values, values, np.nan)) > threshold
     return _along(results, axis, beyond, results.with_values)

@@ -212,7 +212,8 @@ def _amplified_besides(results: Results, told: str) -> str:
     beyond = sorted((name for name, gain in most.items() if gain > threshold), key=lambda name: -most[name])
     if results.size < 2 or not beyond:
         return ""
-    words = [f"{name} (up to {number(most[name])})" for name in beyond[:MOST_TOLD]]
+    digits = {name: 3 if number(most[name]) != number(threshold) else 5 for name in beyond}  # not "1.1 exceeds 1.1"
+    words = [f"{name} (up to {number(most[name], digits[name])})" for name in beyond[:MOST_TOLD]]
     words += [f"{len(beyond) - MOST_TOLD} more"] * (len(beyond) > MOST_TOLD)
     exceed = f"exceed{'s' * (len(beyond) == 1)} a dynamic amplification of {number(threshold)}"
     return f" Of the other sensors {listed(words)} {exceed}."

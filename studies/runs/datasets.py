@@ -39,14 +39,18 @@ def archive_of(dataset: xr.Dataset, path: Path | str, study: Study | None = None
     return Archive(Path(path), root, with_first_frequency(models, results) if marched else models)
 
 
-def write(dataset: xr.Dataset, path: Path | str, study: Study | None = None) -> Path:
+def write(dataset: xr.Dataset, path: Path | str, study: Study | None = None, *, overwrite: bool = False) -> Path:
     """Write a dataset of `studies.run` as an archive, which every command reads; the archive's path.
 
-    study: as of `archive_of`. Raises BadInput where there is something at that place, or where the dataset is no longer
-    what its study gives, and OutputFailed.
+    study: as of `archive_of`. overwrite: an archive that is there is replaced. Raises BadInput where there is anything
+    else at that place, or where the dataset is no longer what its study gives, and OutputFailed.
     """
     path = Path(path)
-    files.check_new_place(path)
+    if overwrite:
+        files.check_output_place(path)
+        files.check_replaceable(path)
+    else:
+        files.check_new_place(path)
     archive = archive_of(dataset, path, study)
     if found := next(findings(archive, study or Results.of(dataset).study), ""):
         raise BadInput(
