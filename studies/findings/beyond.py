@@ -206,8 +206,9 @@ def _in_parts(results: Results, axis: Axis, beyond: Mask) -> str:
 
 
 def _comes_close(results: Results, values: Array, limit: float, axis: Axis | None) -> str:
-    """Where along a swept number values are just below a limit, and none beside them is above it; "" nowhere."""
-    if axis is None or axis.dim == VARIANT:
+    """Where along a swept number values are just below a limit, and none beside them is above it; "" nowhere, and of
+    samples, of which it is told in which part they are above."""
+    if axis is None or axis.dim == VARIANT or (VARIANT in results.dims and _has_samples(results, axis)):
         return ""
     line = np.moveaxis(np.where(results.with_values, values, 0.0), results.dims.index(axis.dim), 0)
     line = line[np.argsort(axis.values)]

@@ -183,6 +183,7 @@ def test_of_samples_that_are_told_loosely_both_parts_are_told() -> None:
     rank = np.where(own == 5.0, np.cumsum(own == 5.0).reshape(own.shape), 0)
     said = told_limit(results, 0.1 * rank, 0.55, "m", speed, np.where(rank > 0, 0.2, 0.0))
     words = [f"at 5 m/s in {part} % and at 10 m/s in 0 % of the variants" for part in (50, 70, 30)]
+    assert "within 1 %" not in told_limit(results, np.where(own == 5.0, 0.549, 0.0), 0.55, "m", speed)
     assert said.endswith(f"exceeds 550 mm {words[0]}; with its estimated error perhaps {words[1]}, surely {words[2]}.")
 
 
