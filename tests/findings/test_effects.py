@@ -74,6 +74,12 @@ def test_both_ways_in_words(backward: list[float], error: float, words: str) -> 
     assert told_both_ways(results, np.array([[1.0, 2.0, 3.0], backward]), "it", "m", error) == words
 
 
+def test_directions_are_words_along_an_axis_too() -> None:
+    figures = {one.name: one for one in answers.figures(scenes.run("passage", WAY, extra=ELSEWHERE))}
+    axes = [one for figure in figures.values() for one in figure.drawing.axes if one.get_xlabel() == "way"]
+    assert axes and all([tick.get_text() for tick in one.get_xticklabels()] == ["forward", "backward"] for one in axes)
+
+
 def test_without_a_swept_direction_nothing_is_said_of_both_ways() -> None:
     results = Results.of(scenes.run("passage", MASS))
     assert told_both_ways(results, np.ones(3), "it", "m") == ""

@@ -16,7 +16,7 @@ from results_schema.lazy_imports import xr
 from results_schema.status import Status
 from studies.pictures.common import figures as look
 from studies.pictures.common.figures import is_logarithmic, legend_beside, logarithmic, shades, widen
-from studies.results.axes import VARIANT, Axis
+from studies.results.axes import DIRECTION, VARIANT, Axis
 from studies.results.formatting import ALIKE, listed
 from studies.results.places import Index, spread
 from studies.results.results import Results, statuses
@@ -179,6 +179,8 @@ def along_axis(axes: Axes, seen: View) -> None:
     """Label and scale of the horizontal axis."""
     assert seen.x is not None
     axes.set_xlabel(seen.x.title)
+    if seen.x.sets(DIRECTION):
+        axes.set_xticks(seen.x.shown, [seen.x.in_words(float(value)) for value in seen.x.values])
     if is_logarithmic(seen.x.shown):
         logarithmic(axes.xaxis)
 
