@@ -1,7 +1,7 @@
 """What differs from variant to variant: columns of numbers for the models below, which know no dotted key.
 
-Mass, force, pace, damping and gravity may differ within one scene; every other swept number changes the scene itself,
-and the plan groups by it.
+Mass, force, pace, damping and gravity may differ within one scene, and so may what changes the units of time and force
+alone (`engine.scene.similarity`); every other swept number changes the scene itself, and the plan groups by it.
 """
 
 from __future__ import annotations

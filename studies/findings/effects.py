@@ -60,9 +60,8 @@ def by_effect(results: Results, values: Array) -> list[Axis]:
 
 def told_effects(results: Results, values: Array, what: str, error: Array | float = 0.0) -> str:
     """How the largest of positive values (in the sweep's shape) over all other swept numbers changes along each, that
-    first along which it changes most; ""
-    without several numbers on a grid, or where any variant does not count: what is largest is not known then. error: of
-    the values, within which a change may be none."""
+    first along which it changes most; "" without several numbers on a grid, or where any variant does not count: what
+    is largest is not known then. error: of the values, within which a change may be none."""
     axes = [axis for axis in results.axes if len(axis.values) > 1]
     known = np.where(results.with_values, values, np.nan)
     if not 2 <= len(axes) <= MOST_EFFECTS or VARIANT in results.dims or not np.isfinite(known).all():

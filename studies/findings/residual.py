@@ -192,7 +192,7 @@ def _shortest(results: Results, sensor: str) -> str:
             where = ", ".join(f"{axis.noun} {axis.in_words(value)}" for axis, value in pairs)
             rows.append(f"{_least(results, sensor, among, known=given)} ({where})")
     whatever = f", whatever {listed([axis.noun for axis in given[len(each) :]])}" if rest else ""
-    return f"move and settling take at least {listed(rows)}{whatever}" if rows else "none settles in all of these"
+    return f"move and settling take at least {listed(rows)}{whatever}" if rows else f"no motion settles{whatever}"
 
 
 def _least(results: Results, sensor: str, values: Array, words: str = "", known: Sequence[Axis] = ()) -> str:

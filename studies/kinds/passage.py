@@ -254,7 +254,7 @@ def _ways_besides(results: Results, told: str) -> str:
     said = [ways if n == 0 else ways._replace(at="") for n, (_, ways) in enumerate(known[:MOST_TOLD])]
     words = [f"{name} ({ways.words(results.sensors[name])})" for (name, _), ways in zip(known, said, strict=False)]
     words += [f"{len(known) - MOST_TOLD} more by less"] * (len(known) > MOST_TOLD)
-    return f" Of the other sensors the largest values differ forward and backward of {listed(words)}." if words else ""
+    return f" The largest values of other sensors differ forward and backward: {listed(words)}." if words else ""
 
 
 def _once(remark: str, said: list[str]) -> list[str]:

@@ -189,7 +189,7 @@ def test_sensors_that_differ_in_both_directions_are_told_beside_the_first() -> N
     told = answers.answer(found)[0]
     ends = found["end_max"].values
     assert found.midspan_max[0] == pytest.approx(float(found.midspan_max[1]), rel=1e-3)
-    assert "the largest values differ forward and backward of " in told
+    assert " The largest values of other sensors differ forward and backward: " in told
     assert f"end ({quantity(float(ends[0]), 'N')} forward, {quantity(float(ends[1]), 'N')} backward)" in told
 
 

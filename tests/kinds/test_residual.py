@@ -1,7 +1,6 @@
 """What answers say of residual vibrations, and of the documentation's own study of them."""
 
 import re
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ from studies.findings import theory
 from studies.findings.absolute_errors import absolute_errors
 from studies.protocol.study import kind_of
 from studies.reporting import answers, summary
-from studies.results.formatting import listed, quantity
+from studies.results.formatting import quantity
 from studies.results.results import Results
 from tests.engine.build import beam, force, study
 
@@ -213,23 +212,6 @@ def test_it_is_said_how_long_it_takes_to_settle() -> None:
     assert axes.get_ylabel() == "time of move and settling (s)"
 
 
-def test_no_band_of_errors_reaches_below_the_time_of_the_move() -> None:
-    """Whatever is told of how long it takes to settle; that of one variant reached down to 0.6 s of a move of 2.3 s."""
-    sensors = {"midspan": {"body": "bed", "at": 0.5, "settling_band": 8e-3}}
-    given = study(
-        beam(modes=1, damping_ratio=0.03), force(2.0, MOVE | {"dwell": 6.0}), sensor=sensors, sweep=SWEPT,
-        output={"residual": True}, solver={"steps": 2000, "tolerance": 0.5},
-    )  # fmt: skip
-    found = studies.run(given)
-    whole, settling = (found[f"midspan_{name}_time"].values for name in ("move_and_settle", "settling"))
-    found["estimated_error"].loc[{"result": "midspan_move_and_settle_time"}] = 0.9
-    (figure,) = (one for one in studies.figures(found) if one.name == "settling")
-    (axes,) = figure.drawing.axes
-    vertices = axes.collections[0].get_paths()[0].vertices[:, 1]
-    assert vertices.min() == pytest.approx((whole - settling).min(), rel=1e-6) and (settling < 0.9 * whole).any()
-    assert vertices.max() > 1.5 * whole.max()
-
-
 def test_where_all_stop_at_the_same_time_settling_times_are_drawn() -> None:
     sensors = {"midspan": {"body": "bed", "at": 0.5, "settling_band": 8e-3}}
     swept = {"force": {"of": "carriage.car.force", "values": [1.0, 2.0, 3.0]}}
@@ -384,37 +366,3 @@ def test_how_many_share_an_end_is_told_in_place_of_one_of_them() -> None:
     few = studies.run(given.with_values({"sweep.load.values": [0.1, 0.2, 2.0]}))
     time = next(one for one in summary.shown(Results.of(few)) if one.name == "midspan_settling_time")
     assert time.smallest.at == "at load 100 mN and 1 more"
-
-
-def test_the_best_motion_is_told_for_each_mass_and_way_at_the_worst_damping() -> None:
-    """Not one of all, which is that of the lightest mass and the strongest damping; and what each number does to the
-    swing, the most first."""
-    sensors = {"midspan": {"body": "bed", "at": 0.5, "settling_band": 8e-3}}
-    sweep = SWEPT | {
-        "way": {"of": "carriage.car.motion.direction", "values": ["forward", "backward"]},
-        "push": {"of": "carriage.car.force", "values": [1.0, 2.0]},
-        "zeta": {"of": "body.bed.damping_ratio", "values": [0.02, 0.04, 0.06]},
-    }
-    found = studies.run(stops(sweep=sweep, sensor=sensors, output={"residual": True, "histories": "none"}))
-    dims = ("acceleration", "way", "push", "zeta")
-    times = found.midspan_move_and_settle_time.transpose(*dims)
-    known = np.random.default_rng(5).permutation(times.size).reshape(times.shape) / 100.0 + 1.0
-    known[0, :, :, 0], known[3, 0, 0, 2] = np.nan, np.nan  # these do not settle
-    found["midspan_move_and_settle_time"] = times.copy(data=known)
-    found["midspan_settling_time"] = times.copy(data=0.5 * known)
-    (said,) = (text for text in answers.answer(found) if "at rest" in text)
-    plain, words = re.sub(r" ± \S+ \S+", "", said), list[str]()
-    for way, push in product((1, 0), (0, 1)):  # backward first
-        worst = {step: max(known[step, way, push]) for step in range(5) if np.isfinite(known[step, way, push]).all()}
-        step = min(worst, key=lambda one: worst[one])
-        where = f"way {('forward', 'backward')[way]}, push {push + 1} N"
-        words.append(f"{worst[step]:.3g} s at acceleration {STEPS[step]} m/s² ({where})")
-    assert f"move and settling take at least {listed(words)}, whatever zeta" in plain
-    told = plain.partition("Over all else that is swept, the largest such swing ")[2]
-    swing = found.midspan_residual.transpose(*dims).values
-    ratio = {
-        dim: (most := swing.max(axis=tuple(n for n in range(4) if n != place))).max() / most.min()
-        for place, dim in enumerate(dims)
-        if dim != "way"
-    }
-    assert sorted(ratio, key=lambda dim: told.index(f"over {dim}")) == sorted(ratio, key=lambda dim: -ratio[dim])

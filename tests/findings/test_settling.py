@@ -1,0 +1,67 @@
+"""How long moves take to settle: the best motion, and the bands of errors in the figure."""
+
+import re
+from itertools import product
+
+import numpy as np
+import pytest
+
+import studies
+from studies.reporting import answers
+from studies.results.formatting import listed
+from tests.engine.build import beam, force, study
+from tests.kinds.test_residual import MOVE, STEPS, SWEPT, stops
+
+
+def test_no_band_of_errors_reaches_below_the_time_of_the_move() -> None:
+    """Whatever is told of how long it takes to settle; that of one variant reached down to 0.6 s of a move of 2.3 s."""
+    sensors = {"midspan": {"body": "bed", "at": 0.5, "settling_band": 8e-3}}
+    given = study(
+        beam(modes=1, damping_ratio=0.03), force(2.0, MOVE | {"dwell": 6.0}), sensor=sensors, sweep=SWEPT,
+        output={"residual": True}, solver={"steps": 2000, "tolerance": 0.5},
+    )  # fmt: skip
+    found = studies.run(given)
+    whole, settling = (found[f"midspan_{name}_time"].values for name in ("move_and_settle", "settling"))
+    found["estimated_error"].loc[{"result": "midspan_move_and_settle_time"}] = 0.9
+    (figure,) = (one for one in studies.figures(found) if one.name == "settling")
+    (axes,) = figure.drawing.axes
+    vertices = axes.collections[0].get_paths()[0].vertices[:, 1]
+    assert vertices.min() == pytest.approx((whole - settling).min(), rel=1e-6) and (settling < 0.9 * whole).any()
+    assert vertices.max() > 1.5 * whole.max()
+
+
+def test_the_best_motion_is_told_for_each_mass_and_way_at_the_worst_damping() -> None:
+    """Not one of all, which is that of the lightest mass and the strongest damping; and what each number does to the
+    swing, the most first."""
+    sensors = {"midspan": {"body": "bed", "at": 0.5, "settling_band": 8e-3}}
+    sweep = SWEPT | {
+        "way": {"of": "carriage.car.motion.direction", "values": ["forward", "backward"]},
+        "push": {"of": "carriage.car.force", "values": [1.0, 2.0]},
+        "zeta": {"of": "body.bed.damping_ratio", "values": [0.02, 0.04, 0.06]},
+    }
+    found = studies.run(stops(sweep=sweep, sensor=sensors, output={"residual": True, "histories": "none"}))
+    dims = ("acceleration", "way", "push", "zeta")
+    times = found.midspan_move_and_settle_time.transpose(*dims)
+    known = np.random.default_rng(5).permutation(times.size).reshape(times.shape) / 100.0 + 1.0
+    known[0, :, :, 0], known[3, 0, 0, 2] = np.nan, np.nan  # these do not settle
+    found["midspan_move_and_settle_time"] = times.copy(data=known)
+    found["midspan_settling_time"] = times.copy(data=0.5 * known)
+    (said,) = (text for text in answers.answer(found) if "at rest" in text)
+    plain, words = re.sub(r" ± \S+ \S+", "", said), list[str]()
+    for way, push in product((1, 0), (0, 1)):  # backward first
+        worst = {step: max(known[step, way, push]) for step in range(5) if np.isfinite(known[step, way, push]).all()}
+        step = min(worst, key=lambda one: worst[one])
+        where = f"way {('forward', 'backward')[way]}, push {push + 1} N"
+        words.append(f"{worst[step]:.3g} s at acceleration {STEPS[step]} m/s² ({where})")
+    assert f"move and settling take at least {listed(words)}, whatever zeta" in plain
+    told = plain.partition("Over all else that is swept, the largest such swing ")[2]
+    swing = found.midspan_residual.transpose(*dims).values
+    ratio = {
+        dim: (most := swing.max(axis=tuple(n for n in range(4) if n != place))).max() / most.min()
+        for place, dim in enumerate(dims)
+        if dim != "way"
+    }
+    assert sorted(ratio, key=lambda dim: told.index(f"over {dim}")) == sorted(ratio, key=lambda dim: -ratio[dim])
+    found["midspan_move_and_settle_time"][{"zeta": 0}] = np.nan
+    (said,) = (text for text in answers.answer(found) if "at rest" in text)
+    assert "; no motion settles, whatever zeta; " in said
