@@ -31,16 +31,19 @@ def add_attachment(rows, tie, first, factor, shapes, motion):
 
 
 @kernel
-def close_rows(rows, inertial, beta, gamma, reaches):
+def close_rows(rows, inertial, alone, first, beta, gamma, reaches):
     """w = P + gamma A + beta B, of which station 0 has P alone; P = p of the ties with inertia, else zero.
 
-    inertial (ties);  reaches (modes, ties): set where a tie's rows of a mode are other than zero anywhere.
+    inertial (ties);  alone (coordinates, ties): P of those from number first on;  reaches (modes, ties): set where a
+    tie's rows of a mode are other than zero anywhere.
     """
     for s in range(rows.shape[0]):
         for k in range(rows.shape[1]):
             for r in range(rows.shape[2]):
                 p, rate, curve = rows[s, k, r, FORCE], rows[s, k, r, RATE], rows[s, k, r, CURVE]
                 w = p if inertial[r] else 0.0
+                if 0 <= k - first < alone.shape[0]:
+                    w = alone[k - first, r]
                 if s > 0:
                     w += gamma * rate + beta * curve
                 rows[s, k, r, CLOSED] = w

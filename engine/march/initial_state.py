@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from engine.kernels.layout import State
-from engine.model.attachment import rows
+from engine.model.attachment import residual, rows, without_negative
 from engine.model.station_path import Along, StationPath
 from engine.model.track import rate_rows
 from engine.statics.equilibrium import static_state
@@ -62,6 +62,8 @@ def _coordinates(model: SceneModel, along: Along, state: StaticState) -> Array:
                 part = model.bodies[attachment.body]
                 soft = attachment.factor * rows(model, attachment, along)[0] * part.modal.modal_flexibility
                 found[part.modes] += soft[:, None] * state.force[0, r]
+    if (ties := model.corrected).size:
+        found[model.residuals] = without_negative(residual(model, along, ties))[0] @ state.force[0, ties]
     found[state.loose] = state.coordinate[0]
     return found
 

@@ -21,9 +21,6 @@ if TYPE_CHECKING:
     from engine.model.station_path import Along
 
 
-ROUNDED = 1e-12  # of what kept modes miss at one push: what is left beside others is rounding
-
-
 def holds(attachment: Attachment, along: Along) -> bool:
     """Whether an attachment touches its body anywhere along a segment."""
     return attachment.rider is None or along[attachment.rider].active
@@ -97,31 +94,30 @@ def tie_shapes(model: SceneModel, ties: Sequence[int], along: Along) -> Array:
             mode = model.springs[r - model.first_spring].mode
             if mode is not None:
                 found[:, mode, place] = -1.0
-    pushes = np.array([r for r in ties if r >= model.first_push], dtype=np.int64)
-    if model.corrected and pushes.size:
-        own = residual_modes(model, pushes, residual(model, along, pushes))
-        found[:, model.residuals, np.isin(ties, pushes)] = own
     return found
 
 
-def residual_modes(model: SceneModel, pushes: Counts, missed: Array) -> Array:
-    """(S, C, P) what the residual modes of all pushes move the masses of some by, kg^(-1/2), by the numbers of their
-    ties; missed (S, P, P): the flexibility between these that the kept modes miss.
+def residual_rows(model: SceneModel, ties: Counts, missed: Array) -> Array:
+    """(S, C, R) by which forces of some ties enter the residual coordinates; missed (S, R, R): the flexibility between
+    these ties that the kept modes miss.
 
-    Forces F on a track move their places by R F besides the kept modes, R their residual flexibility, and their masses
-    by as much: F = -m (s'' + D2 u + (R F)''). So there is one more mode for every push, of shape omega L at the masses
-    and nowhere else, L L^T = R, each at its own and those that follow. Their own inertia, 1/(R omega^2), is one that
-    modes above omega have too, and keeps light masses from swinging faster than these.
+    Forces F on a track move their places by y = R F besides the kept modes, R their residual flexibility, and their
+    masses by as much: F = -m (s'' + D2 u + y''). So every such tie has one more coordinate, which it alone reads, as
+    it is:  y'' + 2 zeta omega y' + omega^2 y = omega^2 R F.  Its inertia, 1/(R omega^2), is one that modes above omega
+    have too, and keeps light masses from swinging faster than these.
     """
-    root = np.zeros_like(missed)
-    found = np.zeros((len(missed), len(model.corrected), len(pushes)))
-    for j, r in enumerate(pushes):
-        left = missed[:, j:, j] - np.sum(root[:, j:, :j] * root[:, j, None, :j], axis=2)
-        felt = left[:, 0] > ROUNDED * missed[:, j, j]
-        root[felt, j:, j] = left[felt] / np.sqrt(left[felt, :1])
-        number = int(r) - model.first_push
-        found[:, number, j:] = model.residual_omega(model.pushes[number]) * root[:, j:, j]
+    found = np.zeros((len(missed), model.corrected.size, ties.size))
+    _, own, felt = np.intersect1d(model.corrected, ties, assume_unique=True, return_indices=True)
+    square = model.omega[model.residuals][own, None] ** 2
+    found[:, own[:, None], felt] = square * without_negative(missed[:, felt[:, None], felt])
     return found
+
+
+def without_negative(flexibility: Array) -> Array:
+    """(S, R, R) the nearest flexibilities that resist every motion: modes of few elements carry more between nodes
+    than there is."""
+    own, vectors = np.linalg.eigh(flexibility)
+    return np.asarray(vectors * np.maximum(own, 0.0)[:, None] @ np.swapaxes(vectors, 1, 2))
 
 
 def residual(model: SceneModel, along: Along, ties: Counts) -> Array:
@@ -130,13 +126,13 @@ def residual(model: SceneModel, along: Along, ties: Counts) -> Array:
     correction."""
     springs = dict(enumerate(model.springs, start=model.first_spring))
     felt = [place for place, r in enumerate(ties) if r in springs and springs[r].held and not springs[r].rigid]
-    pushes = [place for place, r in enumerate(ties) if r >= model.first_push]
-    if not (felt or pushes) or not model.numerics.static_correction:
+    own = [place for place, r in enumerate(ties) if r in model.corrected]
+    if not (felt or own) or not model.numerics.static_correction:
         return np.zeros((0, 0, 0))
     found, known = np.zeros((along[0].s.size, ties.size, ties.size)), dict[tuple[Attachment, Attachment], Array]()
-    for r in (*felt, *pushes):
-        for s in pushes if r in pushes else range(ties.size):
-            if s in (pushes if r in pushes else felt) and s < r:
+    for r in (*felt, *own):
+        for s in own if r in own else range(ties.size):
+            if s in (own if r in own else felt) and s < r:
                 found[:, r, s] = found[:, s, r]
                 continue
             for one, other in shared(model, ties[r], ties[s], along):

@@ -109,7 +109,7 @@ def lane_table(model: SceneModel, values: VariantValues) -> LaneTable:
     stiffness = [none if spring.rigid else values.column(spring.keys.stiffness) for spring in model.springs]
     sprung = [1.0 / values.column(s.keys.mass)[None] for s in model.sprung]
     added = model.omega.size - model.body_modes - len(sprung)
-    residual = [rates[push.body][-1:] for push in model.corrected]  # damped as the highest mode kept
+    residual = [rates[body][-1:] for body in model.corrected_bodies]  # damped as the highest mode kept
     damped = np.concatenate([*rates, np.zeros((len(model.sprung), values.size)), *residual])
     return LaneTable(
         omega=model.omega,

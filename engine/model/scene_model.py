@@ -19,7 +19,7 @@ from engine.model.rider import Rider
 from engine.model.support_reactions import Place, stand
 from engine.model.ties import CarriageTie, DamperTie, Load, PushTie, SpringTie
 from engine.scene.variants import SpringKeys, keys_of_carriage
-from results_schema.arrays import Array, Mask
+from results_schema.arrays import Array, Counts, Mask
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity
 
@@ -79,10 +79,12 @@ class SceneModel:
 
     @cached_property
     def omega(self) -> Array:
-        """(N,) natural frequencies of all bodies, rad/s, 0 for every sprung mass, those of residual modes, and 0 for
-        the coordinate that stays 1, which is there where something pushes along its track."""
+        """(N,) natural frequencies of all bodies, rad/s, 0 for every sprung mass, those of residual coordinates, which
+        are the highest kept and ask for no smaller steps, and 0 for the coordinate that stays 1, which is there where
+        something pushes along its track."""
         sprung, constant = np.zeros(len(self.sprung)), np.zeros(int(self.has_constant))
-        bodies, residual = (part.modal.omega for part in self.bodies), [self.residual_omega(r) for r in self.corrected]
+        bodies = (part.modal.omega for part in self.bodies)
+        residual = [self.bodies[body].modal.omega[-1] for body in self.corrected_bodies]
         return np.concatenate([*bodies, sprung, residual, constant])
 
     @property
@@ -90,20 +92,26 @@ class SceneModel:
         """Whether the last coordinate is one that stays 1."""
         return any(push.prescribed for push in self.pushes)
 
-    @property
-    def corrected(self) -> tuple[PushTie, ...]:
-        """The pushes that have a residual mode (`attachment.residual_modes`)."""
-        return self.pushes if self.numerics.static_correction else ()
+    @cached_property
+    def corrected(self) -> Counts:
+        """Numbers of the ties that a residual coordinate moves (`attachment.residual_rows`): masses that push, and
+        their pushes."""
+        if not self.numerics.static_correction:
+            return np.zeros(0, dtype=np.int64)
+        own = {push.carriage for push in self.pushes if self.carriages[push.carriage].inertia == "mass"}
+        masses = sorted(r for r in own if not self.springs_of(r))
+        return np.array([*masses, *range(self.first_push, self.ties)], dtype=np.int64)
 
-    def residual_omega(self, push: PushTie) -> float:
-        """The frequency of its residual mode, rad/s: that of the highest mode kept, which asks for no smaller steps."""
-        return float(self.bodies[push.body].modal.omega[-1])
+    @property
+    def corrected_bodies(self) -> list[int]:
+        """The bodies that these ties hold."""
+        return [self.attachments[r][0].body for r in self.corrected]
 
     @property
     def residuals(self) -> slice:
-        """The residual modes among all modes."""
+        """The residual coordinates among all coordinates."""
         first = self.body_modes + len(self.sprung)
-        return slice(first, first + len(self.corrected))
+        return slice(first, first + self.corrected.size)
 
     @property
     def sprung(self) -> tuple[SpringTie, ...]:

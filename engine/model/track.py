@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from engine.kernels.layout import CURVE, FORCE, RATE, Impulse, Ties
 from engine.kernels.tie_rows import add_attachment, close_rows
-from engine.model.attachment import holds, residual, residual_modes, shape_derivatives, tie_shapes
+from engine.model.attachment import holds, residual, residual_rows, shape_derivatives, tie_shapes
 from engine.model.attachment import rows as shape_rows
 from engine.model.station_path import StationPath
 from results_schema.arrays import Array, Counts
@@ -88,18 +88,17 @@ def tie_rows(model: SceneModel, along: Along, ties: Counts, missed: Array | None
                 drive[:, place], level[:, place] = np.where(along[spring.rider].on, under, 0.0)
         elif r < len(model.carriages) and along[r].active and model.carriages[r].inertia == "mass":
             drive[:, place] = _curved_sag(model, model.carriages[r].attachments[0], along)
-    pushes = np.flatnonzero(ties >= model.first_push)
-    if model.corrected and pushes.size:
-        own = residual_modes(model, ties[pushes], missed[:, pushes[:, None], pushes])
-        rows[:, model.residuals, pushes, FORCE] = own
+    if np.isin(ties, model.corrected).any():
+        rows[:, model.residuals, :, FORCE] = residual_rows(model, ties, missed)
     return TieRows(ties, rows, drive, level, missed)
 
 
 def closed(model: SceneModel, found: TieRows, scheme: Newmark | Alpha) -> Ties:
     """Ties along a segment with the implicit part of their rows, w, in place; that of station 0 holds P alone."""
     inertial, moves, springs = (kind[found.ties] for kind in _kinds(model))
+    alone = np.equal.outer(model.corrected, found.ties).astype(np.float64)
     reaches = np.zeros(found.rows.shape[1:3], dtype=np.bool_)
-    close_rows(found.rows, inertial, scheme.beta, scheme.gamma, reaches)
+    close_rows(found.rows, inertial, alone, model.residuals.start, scheme.beta, scheme.gamma, reaches)
     prescribed, reactive = np.flatnonzero(~(moves | springs)), np.flatnonzero(moves | springs)
     unity = np.ones(model.ties)
     unity[model.first_spring : model.first_push] = [0.0 if spring.rigid else 1.0 for spring in model.springs]

@@ -89,7 +89,8 @@ def coupled_modes(model: SceneModel, values: VariantValues, along: Along, count:
         inverse, vectors = np.linalg.eigh(system.inverse(variants))
         omega[variants], order = _lowest(inverse, system.shift, count)
         lines = np.take_along_axis(vectors, order[:, :, None, :], axis=3)
-        lines = lines[:, :, :modes] / np.sqrt(system.mass[variants, None, :modes, None])
+        root = np.sqrt(system.mass[variants, None, :modes, None])
+        lines = np.divide(lines[:, :, :modes], root, out=np.zeros_like(lines[:, :, :modes]), where=root > 0.0)
         shapes[variants, :, :, : order.shape[2]] = np.where(
             np.isnan(omega[variants, :, None, : order.shape[2]]), np.nan, lines
         )
@@ -125,6 +126,7 @@ def _system(model: SceneModel, values: VariantValues, along: Along) -> _System:
     on_track = from_blocks(lanes.mass, values.size)[masses]
     least = MASSLESS * model.leading_body.modal.mass
     mass = np.concatenate([1.0 / from_blocks(lanes.inverse_modal_mass, values.size), np.maximum(on_track, least)])
+    mass[model.residuals] = 0.0  # what kept modes miss between ties is among what these yield
     spring = from_blocks(lanes.spring, values.size)[ties]
     return _System(
         stiffness=np.concatenate([model.omega**2, np.zeros(len(masses))]),
@@ -150,8 +152,6 @@ def _missed(model: SceneModel, along: Along, ties: NDArray[np.int64]) -> Array:
         return found
     for i, r in enumerate(ties):
         for j, s in enumerate(ties[: i + 1]):
-            if r >= model.first_push and s >= model.first_push:
-                continue  # their residual modes are among the coordinates
             for one, other in shared(model, int(r), int(s), along):
                 found[:, i, j] += residual_flexibility(model, one, other, along)
             found[:, j, i] = found[:, i, j]

@@ -264,11 +264,16 @@ def test_levels_have_more_and_more_of_the_modes_that_loads_excite() -> None:
 
 def test_errors_of_what_a_head_beside_the_axis_pushes_are_told() -> None:
     """Of a portal whose head brakes by a lever half of the errors by the first three levels were told too small, up to
-    4.6 times: one change of a few modes says little of forces along a track."""
-    sweep = {"acceleration": {"of": "carriage.head.motion.acceleration", "values": [3.0, 5.0, 7.0]}}
-    plan = make_plan(engine.load(catalogue.find_study("machine-tool")).with_values({"sweep": sweep}))
-    found = audit(plan, np.arange(plan.size))
-    tolerance = tolerances(results_of(plan.asked))[:, None]
-    matters = (found.observed > 0.01 * tolerance) & (found.observed > found.doubt)
-    assert np.count_nonzero(matters) > 10
-    assert np.mean(found.told[matters] < found.observed[matters]) <= 0.02
+    4.6 times, as long as the head did not feel all that few modes miss under it."""
+    sweep = {"acceleration": {"of": "carriage.head.motion.acceleration", "values": [3.0, 4.0, 5.0, 6.0, 7.0, 8.0]}}
+    told, observed = np.zeros(0), np.zeros(0)
+    for wanted in (1e-3, 2e-2):
+        given = engine.load(catalogue.find_study("machine-tool"))
+        plan = make_plan(given.with_values({"sweep": sweep, "solver.tolerance": wanted}))
+        found = audit(plan, np.arange(plan.size))
+        tolerance = tolerances(results_of(plan.asked))[:, None]
+        matters = (found.observed > 0.01 * tolerance) & (found.observed > found.doubt)
+        told = np.append(told, found.told[matters])
+        observed = np.append(observed, found.observed[matters])
+    assert observed.size > 10
+    assert np.mean(told < observed) <= 0.02
