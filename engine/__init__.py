@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from engine.batch.execution import run
     from engine.batch.plan import Plan, make_plan
     from engine.scene.study import Study, load
-    from results_schema.errors import Remark
+    from results_schema.errors import BadInput, Remark
 
 _HOMES = {
     "Study": "engine.scene.study",
@@ -23,9 +23,10 @@ _HOMES = {
     "run": "engine.batch.execution",
     "Plan": "engine.batch.plan",
     "make_plan": "engine.batch.plan",
+    "BadInput": "results_schema.errors",
     "Remark": "results_schema.errors",
 }
-__all__ = ["Plan", "Remark", "Study", "load", "make_plan", "run"]
+__all__ = ["BadInput", "Plan", "Remark", "Study", "load", "make_plan", "run"]
 
 
 def __getattr__(name: str) -> Any:

@@ -11,7 +11,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from results_schema.errors import Remark
+    from results_schema.errors import BadInput, Remark
     from studies.findings.absolute_errors import errors
     from studies.protocol.study import Kind, kind_named, kind_names, run
     from studies.reporting.answers import answer, figures
@@ -30,9 +30,11 @@ _HOMES = {
     "compare": "studies.reporting.comparison",
     "write": "studies.runs.datasets",
     "report": "studies.reporting.report",
+    "BadInput": "results_schema.errors",
     "Remark": "results_schema.errors",
 }
 __all__ = [
+    "BadInput",
     "Kind",
     "Remark",
     "answer",

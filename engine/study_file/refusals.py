@@ -140,6 +140,8 @@ def bad_input(detail: Any, model: type[Spec], data: Any, source: Source) -> BadI
     bound = any(name in context for _, name, _ in _BOUNDS)
     remedy = place.hint if place and bound else nearest(detail["input"], [str(word) for word in words])
     remedy = remedy or _misplaced(model, data, keys)
+    if not remedy and place and isinstance(detail["input"], list) and "a list" not in expected:
+        remedy = f'to vary it: [sweep] NAME = {{ of = "{".".join(map(str, keys))}", values = {received} }}'
     return BadInput(_what(detail), where=where, expected=expected or detail["msg"], received=received, remedy=remedy)
 
 
@@ -152,7 +154,7 @@ def _misnamed(data: Any, keys: Keys) -> str:
     if not isinstance(own, dict) or "kind" in own or len(own) != 1:
         return ""
     others = [str(name) for name in around if name != keys[-2]] if isinstance(around, dict) else []
-    return nearest(keys[-2], others)
+    return nearest(keys[-2], others) or (f"a kind, or one that there is: {', '.join(others)}" if others else "")
 
 
 def _too_few(model: type[Spec], data: Any, keys: Keys, source: Source) -> BadInput:

@@ -248,9 +248,13 @@ def show_comparison(found: Comparison) -> None:
     apart = [one for one in found.differences if one.largest]
     if apart:
         blank()
-        rows = [(one.name, *_quantities(one, *one.values), *_beside(one), f"{one.beyond:,}") for one in apart]
+        untold = any(one.unknown for one in apart)  # a column of zeros says nothing
+        counts = [(f"{one.beyond:,}", *([f"{one.unknown:,}"] if untold else [])) for one in apart]
+        values = [(one.name, *_quantities(one, *one.values), *_beside(one)) for one in apart]
         title = "Where they differ most; beyond: variants that do by more than told errors"
-        table(title, ("result", "first", "second", "apart", "errors", "beyond"), rows)
+        title += "; untold: where none is known" * untold
+        headings = ("result", "first", "second", "apart", "errors", "beyond", *["untold"] * untold)
+        table(title, headings, [(*own, *count) for own, count in zip(values, counts, strict=True)])
         ends = [(one.name, *_quantities(one, *one.extremes), one.where) for one in apart]
         table("Values of largest size", ("result", "first", "second", "they differ most at"), ends)
     if found.only_in_one:
@@ -259,6 +263,8 @@ def show_comparison(found: Comparison) -> None:
     if same:
         paragraphs(f"Equal in every variant: {', '.join(same)}.")
     paragraphs("They agree within their estimated errors." if found.agree else "They differ.")
+    if not found.agree and not (found.statuses or found.only_in_one or any(one.beyond for one in apart)):
+        paragraphs("Wherever errors are told they explain it.")
     blurred = [one.name for one in apart if one.blurred and not one.beyond]
     if blurred:
         paragraphs(

@@ -100,7 +100,7 @@ def _scales(results: Results, name: str, sensor: str) -> tuple[Any, Any]:
     if name == "lag":
         return _cruise(results), np.nan
     if name.endswith(("_settling_time", "_move_and_settle_time")):
-        return np.nan, dataset[name]
+        return dataset[name], np.nan  # over the time that is told, not the true one
     if f"{stem}_max" in dataset and f"{stem}_min" in dataset:
         return _scales_of_ends(results, stem, _largest([dataset[f"{stem}_max"], dataset[f"{stem}_min"]]))
     return 1.0, np.nan  # an index

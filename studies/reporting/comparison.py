@@ -22,9 +22,10 @@ from studies.runs.identity import SOURCES
 
 
 class Difference(NamedTuple):
-    """A result in both archives: its values in the first and second where they differ most (NaN where one has no
-    number), where that is, both estimated errors together there (NaN: none is known), in how many variants it is not
-    known to lie within these, and its value of largest size in each."""
+    """A result in both archives: its values in the first and second where they exceed their errors the most, or where
+    none does differ most (NaN where one has no number), where that is, both estimated errors together there (NaN: none
+    is known), in how many variants it lies beyond these, in how many it differs and none is known, and its value of
+    largest size in each."""
 
     name: str
     units: str
@@ -32,6 +33,7 @@ class Difference(NamedTuple):
     where: str
     allowed: float
     beyond: int
+    unknown: int
     extremes: tuple[float, float]
 
     @property
@@ -64,7 +66,8 @@ class Comparison:
     @property
     def agree(self) -> bool:
         """Whether the variants of both have the same statuses, and results that their errors explain."""
-        return not (self.statuses or self.only_in_one) and not any(found.beyond for found in self.differences)
+        explained = not any(found.beyond or found.unknown for found in self.differences)
+        return not (self.statuses or self.only_in_one) and explained
 
 
 def compare(first: xr.Dataset, second: xr.Dataset) -> Comparison:
@@ -103,7 +106,7 @@ def compared(first: Results, second: Results) -> Comparison:
 def _programs(*archives: Results) -> tuple[str, ...]:
     """What made each archive, where that differs."""
     made = [(one.dataset.attrs.get("packages", ["unknown"])[0], one.dataset.attrs.get(SOURCES)) for one in archives]
-    found = tuple(f"{version}, sources {sources or 'unknown'}" for version, sources in made)
+    found = tuple(f"{version}, sources {sources}" for version, sources in made if sources)  # of archives alone
     return found if len(set(found)) > 1 else ()
 
 
@@ -133,13 +136,14 @@ def _differences(first: Results, second: Results, names: list[tuple[Range, str]]
     for found, name in names:
         old, new = (_of(results, found).values.astype(np.float64) for results in (first, second))
         apart = np.where((old == new) | (np.isnan(old) & np.isnan(new)), 0.0, np.abs(new - old))
-        # np.argmax takes a NaN, a number in one of them alone, for the largest
-        place = tuple(map(int, np.unravel_index(int(np.argmax(apart)), apart.shape))) if apart.ndim else ()
         allowed = _allowed(first, second, found, apart)
-        beyond = int(np.count_nonzero((apart != 0.0) & ~(apart <= allowed)))
+        beyond, unknown = np.isnan(apart) | (apart > allowed), (apart > 0.0) & np.isnan(allowed)
+        # np.argmax takes a NaN, a number in one of them alone, for the largest
+        most = np.argmax(np.where(beyond, apart - np.nan_to_num(allowed), 0.0) if beyond.any() else apart)
+        place = tuple(map(int, np.unravel_index(int(most), apart.shape))) if apart.ndim else ()
         values, extremes = (float(old[place]), float(new[place])), (_extreme(old), _extreme(new))
-        where = first.at(place[: len(first.dims)])
-        yield Difference(name, found.units, values, where, float(allowed[place]), beyond, extremes)
+        where, counts = first.at(place[: len(first.dims)]), (int(beyond.sum()), int(unknown.sum()))
+        yield Difference(name, found.units, values, where, float(allowed[place]), *counts, extremes)
 
 
 def _extreme(values: Array) -> float:

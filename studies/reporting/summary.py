@@ -308,8 +308,8 @@ def _extreme(results: Results, array: xr.DataArray, flat: np.intp, errors: Array
             variant[str(name)] = value = coordinate.variable[place[coordinate.dims[0]]].values.item()
             if coordinate.size == 1 and name not in swept_axes:
                 continue  # the one scene of a study of schemes, say
-            if isinstance(value, str):
-                words[str(name)] = value
+            if isinstance(value, str | int):  # numbers of variants and modes are never rounded
+                words[str(name)] = str(value)
             elif name in swept_axes:
                 words[str(name)] = swept_axes[str(name)].in_words(value)
             else:

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from results_schema.arrays import Array, Mask
-from results_schema.errors import BadInput, shortened
 from results_schema.lazy_imports import xr
 from results_schema.status import LOST, Status, label
 from studies.results.axes import PACES, VARIANT, Axis
 from studies.results.cells import counts_of
+from studies.results.checks import check_whole, taken
 from studies.results.formatting import number, quantity, typed_unit
 from studies.results.places import Index
 
@@ -25,54 +25,6 @@ if TYPE_CHECKING:
     from engine.scene.study import Study
 
 LETTERS = 26  # of a line beside a panel: as many are as high as one of four panels of a figure
-
-
-def _taken(dataset: xr.Dataset) -> xr.Dataset:
-    """A dataset that a user gives, without the fill values that xarray puts on coordinates when it writes files. Raises
-    BadInput for what is no dataset of a study."""
-    known = isinstance(dataset, xr.Dataset)
-    if known and "study" in dataset.attrs and "status" not in dataset:
-        what, remedy = "this dataset has lost the status of its variants", "drop no variable that sentences need"
-        raise BadInput(what, where="status", expected="the dataset as studies.run gives it", remedy=remedy)
-    if not known or "study" not in dataset.attrs:
-        raise BadInput(
-            "this does not hold the results of a study",
-            where="dataset",
-            expected="a dataset of studies.run, with its attributes",
-            received=f"a dataset of {shortened(list(dataset.variables))}" if known else f"a {type(dataset).__name__}",
-            remedy="studies.run(study) in place of engine.run(study), whose dataset is of the march alone"
-            if known
-            else "xarray.open_dataset(...) of an archive, or what studies.run gives",
-        )
-    found = dataset.copy()
-    for name in found.coords:
-        for place in (found.variables[name].attrs, found.variables[name].encoding):
-            place.pop("_FillValue", None)
-    return found
-
-
-def _check_whole(dataset: xr.Dataset, study: Study) -> None:
-    """Raise BadInput for some of a study's variants, or what was made of them: what is said is of all."""
-    swept = study.sweep.axes if study.output.keeps_variants else {}
-    sizes = {name: (axis.size, dataset[name].size) for name, axis in swept.items() if name in dataset}
-    cut = [name for name, (whole, there) in sizes.items() if whole != there or not dataset[name].ndim]
-    known = {str(dim) for name in swept if name in dataset for dim in dataset[name].dims}
-    beside = set(dataset["status"].dims) - known if known else set()
-    beside |= set(dataset["tolerance"].dims) - {"result"} if "tolerance" in dataset else set()
-    if joined := sorted(map(str, beside)):
-        raise BadInput(
-            "this dataset joins the results of several studies, and a study's own sentences and figures are of one",
-            where=joined[0],
-            expected=f"the dimensions {', '.join(sorted(known))}" if known else "no such dimension",
-            remedy="ask each of them, or sweep that number in one study",
-        )
-    if cut or dataset["status"].dtype.kind != "i":
-        raise BadInput(
-            "this dataset holds a part of its study's results, or what was computed from them",
-            where=cut[0] if cut else "status",
-            expected="the dataset of a whole study",
-            remedy="select from what xarray has, or run a study of these variants alone",
-        )
 
 
 class Trace(NamedTuple):
@@ -108,11 +60,11 @@ class Results:
         Raises BadInput where the text is no study, or the dataset none of its results, or a part of them."""
         import engine
 
-        dataset = _taken(dataset)
+        dataset = taken(dataset)
         if study is None:
             text = str(dataset.attrs["study"])
             study = engine.load(text if "\n" in text else f"{text}\n")
-        _check_whole(dataset, study)
+        check_whole(dataset, study)
         return cls(dataset, study)
 
     @cached_property

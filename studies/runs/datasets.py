@@ -18,6 +18,14 @@ from studies.runs.identity import run_key
 from studies.runs.not_audited import PYTHON, WHY
 from studies.runs.provenance import attributes
 
+#: Ends of names that other formats have, and what xarray writes them by.
+OTHER_FORMATS = {
+    ".csv": 'to_dataframe().to_csv("a.csv")',
+    ".parquet": 'to_dataframe().to_parquet("a.parquet")',
+    ".zarr": 'to_zarr("a.zarr")',
+    ".toml": "attrs['study']",
+}
+
 
 def archive_of(dataset: xr.Dataset, path: Path | str, study: Study | None = None) -> Archive:
     """An archive in memory: the dataset with what an archive says of its making, and the bodies beside it.
@@ -46,10 +54,16 @@ def write(dataset: xr.Dataset, path: Path | str, study: Study | None = None, *, 
     else at that place, or where the dataset is no longer what its study gives, and OutputFailed.
     """
     path = Path(path)
+    if path.suffix in OTHER_FORMATS:
+        what, remedy = "an archive is a netCDF file", f"the command export, or dataset.{OTHER_FORMATS[path.suffix]}"
+        raise BadInput(what, where=str(path), expected="a name that ends with .nc", remedy=remedy)
     if overwrite:
         files.check_output_place(path)
         files.check_replaceable(path)
     else:
+        if path.exists():
+            remedy = "overwrite=True, where that is an archive, or another name"
+            raise BadInput("there is a file already", where=str(path), remedy=remedy)
         files.check_new_place(path)
     archive = archive_of(dataset, path, study)
     if found := next(findings(archive, study or Results.of(dataset).study), ""):
@@ -59,7 +73,8 @@ def write(dataset: xr.Dataset, path: Path | str, study: Study | None = None, *, 
             remedy="write what studies.run gives; a dataset of your own goes to a file by its to_netcdf",
         )
     if VALUES in dataset.attrs and dataset.attrs[VALUES] != checksum_of_values(dataset):
-        what, remedy = "values of this dataset were changed", "what is your own goes to a file by its to_netcdf"
+        what = "values of this dataset were changed, or variables dropped"
+        remedy = "what is your own goes to a file by its to_netcdf"
         raise BadInput(what, where="dataset", expected="the numbers that studies.run gave", remedy=remedy)
     write_archive(path, archive.root, archive.groups)
     return path

@@ -190,3 +190,42 @@ def test_studies_of_other_axes_have_nothing_to_compare() -> None:
     other = studies.run(study(down, solver=steps, sweep={"m": {"of": MASS_KEY, "values": [200, 400]}}))
     with pytest.raises(BadInput, match=r"(?s)none in the first, m in the second.*run both over the same axes"):
         studies.compare(one, other)
+
+
+def test_errors_of_settling_times_are_parts_of_the_time_that_is_told() -> None:
+    """3.5 s were told of 0.37 s, though the run rested for 2.5 s: the told time was made longer by its own error."""
+    rest = {"kind": "point-to-point", "start": 0.4, "end": 2.8, "speed": 1.5, "acceleration": 6.0, "dwell": 8.0}
+    sensors = {"sway": {"node": "b", "direction": "x", "settling_band": 2e-4}}
+    car = mass(400.0, rest, on="portal", inertia_along=True)
+    given = study(sensors, carriage={"car": car}, solver={"steps": 2000}, output={"residual": True})
+    results = Results.of(studies.run(given))
+    name, took = "sway_settling_time", results.dataset.sway_settling_time.values
+    assert np.isfinite(took).all() and (took > 0.0).all()
+    np.testing.assert_allclose(absolute_errors(with_error(results, name, 0.9), name), 0.9 * took, rtol=1e-6)
+
+
+def test_what_no_error_is_told_of_is_counted_apart() -> None:
+    """43 settling times counted as beyond errors that were not known, by values that lay within theirs."""
+    first, second = blurred(0.1)
+    first, second = first.copy(deep=True), second.copy(deep=True)
+    row = first["result"].values.tolist().index("midspan_max")
+    first["estimated_error"].values[0, row] = np.nan
+    told = next(one for one in studies.compare(first, second).differences if one.name == "midspan_max")
+    assert (told.beyond, told.unknown) == (0, 1) and not studies.compare(first, second).agree
+    second["midspan_max"].values[2] *= 0.5
+    told = next(one for one in studies.compare(first, second).differences if one.name == "midspan_max")
+    assert (told.beyond, told.unknown) == (1, 1) and told.largest == pytest.approx(
+        float(second.midspan_max[2] - first.midspan_max[2])
+    )
+
+
+def test_numbers_of_variants_are_not_rounded() -> None:
+    """ "variant 1580" was told of 1578, which is another one."""
+    axes = {"zip": True, "speed": {"of": "carriage.car.motion.speed", "values": np.linspace(0.1, 1.0, 1234)}}
+    solver = {"fidelity": "static", "audit": 0, "steps": 50}
+    given = build.study(beam(), mass(0.3, cruise(0.0, 1.0, 1.0)), solver=solver, sweep=axes)
+    results = Results.of(studies.run(given))
+    worst = results.dataset.copy(deep=True)
+    worst["midspan_max"].values[1231] *= 2.0
+    told = rows(Results.of(worst))["midspan_max"].largest.where
+    assert "variant 1231" in told, told

@@ -51,6 +51,33 @@ def test_changed_numbers_are_not_written_as_those_of_the_study(tmp_path: Path) -
         assert "values_crc32" not in again.attrs and again.midspan_max.equals(found.midspan_max)
 
 
+def test_archives_have_names_of_netcdf_files_and_replace_what_they_are_told_to(tmp_path: Path) -> None:
+    """A "found.csv" was a netCDF file, and the message on a file that is there did not name `overwrite`."""
+    found = scenes.run("passage", PASSAGES)
+    said = refused(studies.write, found, tmp_path / "found.csv")
+    assert "to_csv" in said and "ends with .nc" in said and not list(tmp_path.iterdir())
+    path = studies.write(found, tmp_path / "found.nc")
+    assert "overwrite=True" in refused(studies.write, found, path)
+
+
+def test_what_was_selected_from_a_dataset_is_told_from_its_whole() -> None:
+    """One sensor ended in an IndexError, one result in a ValueError, a new name of an axis as several studies."""
+    found = scenes.run("passage", PASSAGES)
+    for part in (
+        found.sel(sensor="midspan"),
+        found.sel(sensor=["midspan"]),
+        found.sel(result="midspan_max"),
+        found.isel(pace=slice(2)),
+        found.isel(pace=0),
+    ):
+        for call in (studies.errors, studies.answer):
+            said = refused(call, part)
+            assert "a part of its study's results" in said and "give the whole dataset and select" in said
+    said = refused(studies.errors, found.rename(pace="speed"))
+    assert said.startswith("pace: this dataset has lost a swept number of its study")
+    assert studies.BadInput is engine.BadInput is BadInput
+
+
 def test_datasets_that_went_through_files(tmp_path: Path) -> None:
     """xarray gives coordinates a fill value of its own when it writes them."""
     scenes.run("passage", PASSAGES).to_netcdf(tmp_path / "kept.nc")
@@ -94,5 +121,8 @@ def test_a_misspelt_name_in_a_dotted_key_gets_a_hint() -> None:
     given = scenes.study("passage")
     said = refused(given.with_values, {"carriage.tabel.motion.speed": 3.0})
     assert "carriage.tabel.kind: the kind is missing" in said and 'did you mean "table"?' in said
+    assert "one that there is: table" in refused(given.with_values, {"carriage.z.motion.speed": 3.0})
+    said = refused(given.with_values, {"carriage.table.motion.speed": [3.0, 4.0]})
+    assert 'to vary it: [sweep] NAME = { of = "carriage.table.motion.speed", values = [3.0, 4.0] }' in said
     second = {"on": "bed", "mass": 1.0, "motion": {"kind": "cruise", "start": 0.0, "end": 1.0, "speed": 1.0}}
     assert "did you mean" not in refused(given.with_values, {"carriage.table_2": second})
