@@ -196,17 +196,21 @@ def _of_pilots(found: _Round, threads: int, start: float, clock: Callable[[], fl
     scenes, more_scenes = (
         scenes_of_pilots(len(plan.grids), plan.size, count) for count in (found.pilots, max(usual, found.pilots))
     )
-    longer = more_scenes / scenes * max(1.0, drawn * scenes / (measured * more_scenes)) ** 0.5
     more = "" if measured >= drawn else f"; a run measures {drawn} and knows better"
     title = f"What variants are computed with, by the measured errors of {measured} pilots{more}"
-    pace, tables = _pace(plan, clock)
-    march = plan.seconds * pace + tables * len(plan.groups)
-    return Forecast(plan, title, chosen.rows(chosen.chosen(plan)), start + found.took * longer + march / threads)
-
-
-def _pace(plan: Plan, clock: Callable[[], float]) -> tuple[float, float]:
-    """Time of the march over the expected, by the group that takes most of it, and seconds that its tables take."""
     group = max(plan.groups, key=lambda group: group.seconds_per_variant * group.variants.size)
+    pace, tables = _pace(plan, group, clock)
+    march = plan.seconds * pace + tables * len(plan.groups)
+    # Of one scene more pilots march by the same tables.
+    assert plan.choice is not None
+    marched = plan.choice.measured.work * group.seconds_per_variant / group.work * pace
+    again = max(0.0, drawn / measured - more_scenes / scenes) * marched
+    pilots = found.took * more_scenes / scenes + again / threads
+    return Forecast(plan, title, chosen.rows(chosen.chosen(plan)), start + pilots + march / threads)
+
+
+def _pace(plan: Plan, group: Group, clock: Callable[[], float]) -> tuple[float, float]:
+    """Time of the march of a group over the expected, and seconds that its tables take."""
     variants, took = group.variants[:TIMED], list[float]()
     for _ in ("makes the tables", "marches"):
         started = clock()

@@ -22,6 +22,7 @@ from studies.results.places import Index, spread
 from studies.results.results import Results, statuses
 
 MOST_CURVES = 6
+FEW = 4  # values of an axis: a curve through them shows nothing in between
 DASHED = (0, (3, 2))
 UNSEEN = 0.01  # of a plot's height: what lies closer is one line to the eye
 VECTOR_CELLS = 4000  # larger maps are drawn as pictures inside the SVG
@@ -113,7 +114,8 @@ class View:
         axes = [axis for axis in self.results.axes if len(axis.values) > 1]
         held = [self._held(axis) for axis in axes if axis.dim in self.held]
         others = [axis for axis in axes if axis.dim not in self.held and axis not in (self.x, self.y)]
-        varied = f"{listed([axis.name for axis in others])} differ from point to point." if others else ""
+        differ = "differ" if len(others) > 1 else "differs"
+        varied = f"{listed([axis.name for axis in others])} {differ} from point to point." if others else ""
         return " ".join(text for text in (f"Held at {', '.join(held)}." if held else "", varied) if text)
 
     def _held(self, axis: Axis) -> str:
@@ -139,13 +141,17 @@ class View:
 def view(
     results: Results, x: Sequence[str] = SPEEDS, y: Sequence[str] = (*DAMPING, *MASSES), at: Index | None = None
 ) -> View:
-    """A view along the first axis whose key ends like one of `x`, and one like `y`; else along what there is.
+    """A view along the first axis whose key ends like one of `x`, and one like `y`; else along what there is. A few
+    values are curves, not points along a way, where another axis has more than twice as many.
 
     Axes that are not shown are held where a variant is, such as the one that the answer names, or in the middle of
     their values.
     """
     varied = [axis for axis in results.axes if len(axis.values) > 1]
     first = results.axis(*x) or (varied[0] if varied else None)
+    if first is not None and first.values.size <= FEW and first.dim != VARIANT:
+        longest = max(varied or [first], key=lambda axis: axis.values.size)
+        first = longest if longest.values.size > 2 * first.values.size else first
     rest = [axis for axis in varied if axis is not first and first and (axis.dim == VARIANT) == (first.dim == VARIANT)]
     second = next((axis for ending in y for axis in rest if axis.sets(ending)), rest[0] if rest else None)
     shown = {axis.dim for axis in (first, second) if axis is not None}
