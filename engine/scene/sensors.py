@@ -152,7 +152,11 @@ class Sensor(Spec):
         _check_part(self)
         if self.direction is not None and not self.reads.of_arm and self.node is None and self.member is None:
             of_arm = 'without direction; where frames move quantity = "position_error" has one'
-            remedy = "a node with direction where the carriage stops" if self.under is not None else of_arm
+            remedy = (
+                "a node with direction where the carriage stops; beside the axis a point with offset and direction"
+                if self.under is not None
+                else of_arm
+            )
             expected = 'node or member = "its name"'
             raise fault("only nodes and members are read in a direction", expected=expected, remedy=remedy)
         if self.spot is not None and (self.reads.derivative or self.reads.of_contact):

@@ -20,6 +20,7 @@ from studies.results.places import Index, chosen, extreme
 from studies.results.results import Results
 
 MOST_SENSORS = 4
+ALIKE = 1e-3  # of a time: by so much the best motion may differ and count as the same
 MOST_BEST = 4  # values of a swept number of which each is told its best motion
 LAST = 8  # values along a swept number that are looked at: where it is swept too coarsely most of them turn
 FEWEST = 6  # of these
@@ -175,24 +176,39 @@ def _not_settled(results: Results, left: Mask, axis: Axis | None) -> str:
 
 def _shortest(results: Results, sensor: str) -> str:
     """The shortest time of move and settling: for each of a few values of what is none of the motion's to choose, such
-    as the mass or the way, at the worst of what else that is."""
+    as the mass or the way, that first which changes it most, at the worst of what else does."""
     values = settling_of(results, names_of_times(sensor)[1])
-    given = [axis for axis in by_effect(results, values) if axis.sets(DIRECTION) or not axis.sets_motion]
-    given.sort(key=lambda axis: axis.values.size)  # so that as many as can be are told
+    given = [axis for axis in results.axes if axis.values.size > 1 and (axis.sets(DIRECTION) or not axis.sets_motion)]
     if VARIANT in results.dims or not given:
         return f"move and settling take {_least(results, sensor, values, ' at least')}"
-    each = given[: max(1, sum(prod(a.values.size for a in given[: n + 1]) <= MOST_BEST for n in range(len(given))))]
-    rest = tuple(results.dims.index(axis.dim) for axis in given[len(each) :])
+    change = {axis: _changes_best(results, values, given, axis) for axis in given}
+    felt = sorted((axis for axis in given if change[axis] > ALIKE), key=lambda axis: -change[axis])
+    each = felt[: max(1, sum(prod(a.values.size for a in felt[: n + 1]) <= MOST_BEST for n in range(len(felt))))]
+    rest = tuple(results.dims.index(axis.dim) for axis in given if axis not in each)
     longest = np.where(np.isnan(values), np.inf, values).max(axis=rest, keepdims=True)
-    values, rows = np.where((values == longest) & np.isfinite(longest), values, np.nan), list[str]()
+    values, rows = np.where((values == longest) & np.isfinite(longest), values, np.nan), dict[str, list[str]]()
     for own in product(*(chosen(np.sort(axis.values).tolist(), MOST_BEST) for axis in each)):
         pairs = list(zip(each, own, strict=True))
         here = [results.everywhere(results.dataset[axis.name]) == value for axis, value in pairs]
-        if np.isfinite(among := np.where(np.all(here, axis=0), values, np.nan)).any():
-            where = ", ".join(f"{axis.noun} {axis.in_words(value)}" for axis, value in pairs)
-            rows.append(f"{_least(results, sensor, among, known=given)} ({where})")
-    whatever = f", whatever {listed([axis.noun for axis in given[len(each) :]])}" if rest else ""
-    return f"move and settling take at least {listed(rows)}{whatever}" if rows else f"no motion settles{whatever}"
+        among = np.where(np.all(here, axis=0), values, np.nan) if here else values
+        least = _least(results, sensor, among, known=given) if np.isfinite(among).any() else ""
+        rows.setdefault(least, []).append(", ".join(f"{axis.noun} {axis.in_words(value)}" for axis, value in pairs))
+    never = listed(rows.pop("", []))
+    found = [f"{least} ({listed(where)})" if where[0] else least for least, where in rows.items()]
+    worst, same = ([axis.noun for axis in part if axis not in each] for part in (felt, set(given) - set(felt)))
+    end = f", at the worst {listed(worst)}" * bool(worst) + f", whatever {listed(sorted(same))}" * bool(same)
+    if not found:
+        return f"no motion settles{end}"
+    return f"move and settling take at least {listed(found)}{end}{f'; no motion settles at {never}' * bool(never)}"
+
+
+def _changes_best(results: Results, values: Array, given: Sequence[Axis], axis: Axis) -> float:
+    """How many times, less one, the time of the best motion is longer over a swept number that is given, at most."""
+    motion = tuple(n for n, dim in enumerate(results.dims) if all(dim != one.dim for one in given))
+    best = np.where(np.isnan(values), np.inf, values).min(axis=motion, keepdims=True)
+    along = results.dims.index(axis.dim)
+    low, high = best.min(axis=along), best.max(axis=along)
+    return float(np.divide(high, low, out=np.ones_like(low), where=np.isfinite(low)).max() - 1.0)
 
 
 def _least(results: Results, sensor: str, values: Array, words: str = "", known: Sequence[Axis] = ()) -> str:

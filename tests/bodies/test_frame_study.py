@@ -203,6 +203,21 @@ def test_modes_that_loads_do_not_move_stand_in_brackets() -> None:
     assert 1 <= frequencies.count("(") < 6 and not frequencies.startswith("(")
 
 
+def test_directions_are_vectors_or_axes_by_their_names() -> None:
+    """As those of sensors."""
+    named, written = (
+        load(
+            write_document(STUDY | {"body": {"bridge": BRIDGE | {"point": {"shoe": {"node": "b", "direction": way}}}}})
+        )
+        for way in ("y", [0.0, 1.0, 0.0])
+    )
+    assert named.body == written.body
+    with pytest.raises(BadInput, match=r"point\.shoe\.direction"):
+        load(
+            write_document(STUDY | {"body": {"bridge": BRIDGE | {"point": {"shoe": {"node": "b", "direction": "w"}}}}})
+        )
+
+
 def test_unconnected_frames_are_refused() -> None:
     body = write_copy(BRIDGE)
     body["node"] |= {"e": [0.0, 5.0, 0.0], "f": [4.0, 5.0, 0.0]}

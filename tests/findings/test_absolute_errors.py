@@ -74,14 +74,16 @@ def test_no_answer_compares_sway_by_braking_with_what_weights_alone_make() -> No
     """Sentences, tables and figures told it to be 8.9 times the static 3 um; down it is compared as ever."""
     motion = {"kind": "point-to-point", "start": 0.4, "end": 2.8, "speed": 1.5, "acceleration": 6.0, "dwell": 0.1}
     sensors = {"sway": {"node": "b", "direction": [1.0, 0.0, 0.0]}, "down": {"node": "b", "direction": "z"}}
+    sensors |= {"knee": {"point": "knee"}}  # along x
     swept = {"m": {"of": MASS_KEY, "values": [200, 400]}}
     for inertia in (True, False):
         car = mass(400.0, motion, on="portal", inertia_along=inertia)
         dataset = studies.run(study(sensors, carriage={"car": car}, solver={"steps": 400}, sweep=swept))
         told = {one.split(":")[0]: one for one in answers.answer(dataset)}
-        assert ("the static" in told["sway"]) != inertia
+        assert all(("the static" in told[name]) != inertia for name in ("sway", "knee"))
         assert "the static" in told["down"]
-        assert ("dynamic_amplification sway" in rows(Results.of(dataset))) != inertia
+        for name in ("sway", "knee"):
+            assert (f"dynamic_amplification {name}" in rows(Results.of(dataset))) != inertia
         labels = [axes.get_ylabel() for one in studies.figures(dataset) for axes in one.drawing.axes]
         assert not (inertia and any("amplification\nat b along (1, 0, 0)" in label for label in labels))
 

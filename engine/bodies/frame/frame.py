@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field, Strict, Tag, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, Strict, Tag, model_validator
 
 from engine.bodies.frame.geometry import DIRECTIONS, SAME_PLACE, TrackLine, member_ends, unit
 from engine.bodies.frame.refusals import check_frame, check_spot, track_line
@@ -51,13 +51,18 @@ MassWord = Annotated[str, AfterValidator(one_of("consistent", "lumped"))]
 PlaneWord = Annotated[str, AfterValidator(one_of(*PLANES))]
 
 
+def _of_word(value: Any) -> Any:
+    """The vector along an axis that is named, as sensors name theirs."""
+    return [float(axis == value) for axis in "xyz"] if isinstance(value, str) and value in tuple("xyz") else value
+
+
 def _not_zero(vector: tuple[float, float, float]) -> tuple[float, float, float]:
     if not any(vector):
         raise fault("this direction has no length", expected="three numbers, not all zero", received=shortened(vector))
     return vector
 
 
-Vector = Annotated[Three[Dimensionless], AfterValidator(_not_zero)]
+Vector = Annotated[Three[Dimensionless], BeforeValidator(_of_word), AfterValidator(_not_zero)]
 Coordinate = Annotated[Length, Field(ge=-MAX_COORDINATE, le=MAX_COORDINATE)]
 Place = Three[Coordinate]
 Node = Annotated[Several[Coordinate], Field(min_length=2, max_length=3)]
