@@ -78,12 +78,16 @@ def ends_early(plan: Plan) -> Iterator[str]:
 
 
 def vanishes(plan: Plan) -> Iterator[str]:
-    """One sentence for every carriage that only passes and whose way ends on its body soon after it begins."""
+    """One sentence for every carriage that only passes and whose way ends on its body soon after it begins, and for
+    every train whose way does at all."""
+    told = set[str]()  # axles of a train have one table
     for tie in plan.base.carriages:
         motion, length = tie.rider.motion, tie.rider.length
         start, end = (float(motion.path(tau).S) for tau in (0.0, motion.duration))
-        if motion.passes and 0.0 < end < length and abs(end - start) < SHORT * length:
-            table = plan.study.source.written(f"carriage.{tie.name}").replace(".", " ")
+        is_brief = tie.name in plan.study.axles or abs(end - start) < SHORT * length
+        table = plan.study.source.written(f"carriage.{tie.name}").replace(".", " ")
+        if motion.passes and 0.0 < end < length and is_brief and table not in told:
+            told.add(table)
             yield (
                 f"{table} is gone from {end:g} m on, where its {motion.kind} ends on a body of {length:g} m: an end at "
                 "or beyond that of the body lets it leave, other motions let it stop"

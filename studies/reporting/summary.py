@@ -308,10 +308,10 @@ def _extreme(results: Results, array: xr.DataArray, flat: np.intp, errors: Array
             variant[str(name)] = value = coordinate.variable[place[coordinate.dims[0]]].values.item()
             if coordinate.size == 1 and name not in swept_axes:
                 continue  # the one scene of a study of schemes, say
-            if isinstance(value, str | int):  # numbers of variants and modes are never rounded
-                words[str(name)] = str(value)
-            elif name in swept_axes:
+            if name in swept_axes:
                 words[str(name)] = swept_axes[str(name)].in_words(value)
+            elif isinstance(value, str | int):  # numbers of variants and modes are never rounded
+                words[str(name)] = str(value)
             else:
                 words[str(name)] = quantity(value, str(coordinate.attrs.get("units", "1")))
     error = np.nan if errors is None else float(errors.reshape(-1)[flat])

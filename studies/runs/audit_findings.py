@@ -170,7 +170,9 @@ def _compared(group: xr.Dataset, results: Results) -> str:
     audit = f"{counted(verdict.count, 'variant')} computed again with {_more(results)}"
     if not verdict.held:
         beyond = counted(verdict.missed + verdict.unknown, "variant")
-        return f"but of {audit}, {beyond} did not hold it."
+        _, error, name = _worst(group, verdict)
+        worst = f": {name} is off by {scientific(error)}" * bool(verdict.missed)
+        return f"but of {audit}, {beyond} did not hold it{worst}."
     differ = "differ" if verdict.count > 1 else "differs"
     return f"{audit} {differ} by at most {scientific(_worst(group, verdict)[1])}."
 

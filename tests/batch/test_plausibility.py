@@ -32,9 +32,9 @@ STRAIGHT = {
 }
 
 
-def in_a_row(axles: int, after: float) -> Study:
+def in_a_row(axles: int, after: float, end: float = 1.0) -> Study:
     """So many axles that cross the bed."""
-    tram = mass(2e-2, WAY | {"after": after}, axles=axles, spacing=0.1)
+    tram = mass(2e-2, WAY | {"after": after, "end": end}, axles=axles, spacing=0.1)
     return study(beam(), {}, train={"tram": tram}, gravity=0.1)
 
 
@@ -101,6 +101,7 @@ CASES = {
     "the run goes on for 1 first period of the body after the last axle of train tram has left": in_a_row(3, 1.0),
     "does not pitch, as contacts of it hold it at one place of its track: rear and front stay level": on_wheels(),
     "does not act along or across its track: if it did (carriage.car.inertia_along = true": on_portal(),
+    "train tram is gone from 0.5 m on, where its cruise ends on a body of 1 m": in_a_row(3, 5.0, 0.5),
     "carriage car is gone from 0.3 m on, where its cruise ends on a body of 1 m": passing(
         car=mass(0.1, cruise(0.0, 0.3, 0.5))
     ),

@@ -8,7 +8,9 @@ import pytest
 
 import studies
 from studies.reporting import answers
+from studies.reporting.summary import in_tables
 from studies.results.formatting import listed
+from studies.results.results import Results
 from tests.engine.build import beam, force, study
 from tests.kinds.test_residual import MOVE, STEPS, SWEPT, stops
 
@@ -40,6 +42,8 @@ def test_the_best_motion_is_told_for_each_mass_and_way_at_the_worst_damping() ->
         "zeta": {"of": "body.bed.damping_ratio", "values": [0.02, 0.04, 0.06]},
     }
     found = studies.run(stops(sweep=sweep, sensor=sensors, output={"residual": True, "histories": "none"}))
+    told = [end.words["way"] for one in in_tables(Results.of(found)) for end in (one.smallest, one.largest)]
+    assert set(told) == {"forward", "backward"}
     dims = ("acceleration", "way", "push", "zeta")
     times = found.midspan_move_and_settle_time.transpose(*dims)
     known = np.random.default_rng(5).permutation(times.size).reshape(times.shape) / 1000.0 + 1.0
