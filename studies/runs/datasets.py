@@ -22,8 +22,6 @@ from studies.runs.provenance import attributes
 OTHER_FORMATS = {
     ".csv": 'to_dataframe().to_csv("a.csv")',
     ".parquet": 'to_dataframe().to_parquet("a.parquet")',
-    ".zarr": 'to_zarr("a.zarr")',
-    ".toml": "attrs['study']",
 }
 
 
@@ -57,14 +55,12 @@ def write(dataset: xr.Dataset, path: Path | str, study: Study | None = None, *, 
     if path.suffix in OTHER_FORMATS:
         what, remedy = "an archive is a netCDF file", f"the command export, or dataset.{OTHER_FORMATS[path.suffix]}"
         raise BadInput(what, where=str(path), expected="a name that ends with .nc", remedy=remedy)
+    files.check_output_place(path)
     if overwrite:
-        files.check_output_place(path)
         files.check_replaceable(path)
-    else:
-        if path.exists():
-            remedy = "overwrite=True, where that is an archive, or another name"
-            raise BadInput("there is a file already", where=str(path), remedy=remedy)
-        files.check_new_place(path)
+    elif path.exists():
+        remedy = "overwrite=True, where that is an archive, or another name"
+        raise BadInput("there is a file already", where=str(path), remedy=remedy)
     archive = archive_of(dataset, path, study)
     if found := next(findings(archive, study or Results.of(dataset).study), ""):
         raise BadInput(

@@ -10,7 +10,7 @@ import engine.batch.plan
 from engine.batch.plan import make_plan
 from engine.batch.plausibility import remarks
 from engine.bodies.build import build_body
-from engine.bodies.frame.frame import Frame
+from engine.bodies.frame.frame import Frame, Point
 from engine.scene.study import Study, load
 from engine.scene.sweep import expand
 from engine.study_file.document import write_document
@@ -212,6 +212,7 @@ def test_directions_are_vectors_or_axes_by_their_names() -> None:
         for way in ("y", [0.0, 1.0, 0.0])
     )
     assert named.body == written.body
+    assert {"enum": ["x", "y", "z"], "type": "string"} in Point.model_json_schema()["properties"]["direction"]["anyOf"]
     with pytest.raises(BadInput, match=r"point\.shoe\.direction"):
         load(
             write_document(STUDY | {"body": {"bridge": BRIDGE | {"point": {"shoe": {"node": "b", "direction": "w"}}}}})

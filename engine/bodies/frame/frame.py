@@ -62,7 +62,9 @@ def _not_zero(vector: tuple[float, float, float]) -> tuple[float, float, float]:
     return vector
 
 
-Vector = Annotated[Three[Dimensionless], BeforeValidator(_of_word), AfterValidator(_not_zero)]
+Vector = Annotated[Three[Dimensionless], AfterValidator(_not_zero)]
+#: The same, or an axis by its name.
+Way = Annotated[Vector, BeforeValidator(_of_word, json_schema_input_type=Vector | Literal["x", "y", "z"])]
 Coordinate = Annotated[Length, Field(ge=-MAX_COORDINATE, le=MAX_COORDINATE)]
 Place = Three[Coordinate]
 Node = Annotated[Several[Coordinate], Field(min_length=2, max_length=3)]
@@ -150,7 +152,7 @@ class Point(Spec):
     """
 
     node: str
-    direction: Vector | None = None
+    direction: Way | None = None
     offset: Place = _ZERO
 
 
@@ -163,7 +165,7 @@ class Track(Spec):
 
     members: Annotated[Names, Field(min_length=1)]
     offset: Place = _ZERO
-    direction: Vector | None = None
+    direction: Way | None = None
 
 
 class Frame(Body):

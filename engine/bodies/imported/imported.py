@@ -17,7 +17,7 @@ from engine.bodies.files.ansys_results import COMPONENTS
 from engine.bodies.files.model import Counts, FileModel
 from engine.bodies.files.reader import Request, read_files, role_of
 from engine.bodies.files.track import NodeLine, line_as_told
-from engine.bodies.frame.frame import Place, Support, Vector
+from engine.bodies.frame.frame import Place, Support, Vector, Way
 from engine.bodies.frame.geometry import DIRECTIONS, across, unit
 from engine.bodies.frame.refusals import Key, refuse
 from engine.bodies.modal.description import Body, Spot, Spots, check_spot_name, check_square
@@ -57,7 +57,7 @@ class NodeTrack(Spec):
     start: Place | None = Field(default=None, alias="from")
     end: Place | None = Field(default=None, alias="to")
     tolerance: Length | None = Field(default=None, gt=0)
-    direction: Vector | None = None
+    direction: Way | None = None
     interpolation: Annotated[str, AfterValidator(one_of("auto", "rotations", "spline"))] = "auto"
 
     @model_validator(mode="after")
@@ -72,7 +72,7 @@ class NodePoint(Spec):
     """A node off the track and a direction (along gravity unless given): for sensors, and shoes of other bodies."""
 
     node: NodeNumber
-    direction: Vector | None = None
+    direction: Way | None = None
 
 
 class Imported(Body):
