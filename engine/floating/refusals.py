@@ -87,6 +87,10 @@ def _check_sensor(study: Study, name: str, sensor: Sensor) -> None:
     if sensor.is_dynamic_part:
         what = "in frames that move the whole is read, not its dynamic part"
         raise fault(f"{here}.part", what, expected="no such key")
+    if sensor.side is not None:
+        what = f"in frames that move nothing is read {sensor.side} a track"
+        expected, remedy = "no such key", 'quantity = "position_error" at a place of the track takes a direction'
+        raise fault(f"{here}.direction", what, expected=expected, remedy=remedy)
     if sensor.reads.of_drive:
         _check_drive(study, name, sensor)
     if sensor.under is not None and sensor.quantity != "displacement":

@@ -21,7 +21,7 @@ from results_schema.arrays import Array, Mask
 from results_schema.quantities import QUANTITIES
 
 if TYPE_CHECKING:
-    from engine.bodies.modal.modal_body import Gauge, ModalBody, Sections
+    from engine.bodies.modal.modal_body import Direction, Gauge, ModalBody, Sections
     from engine.model.scene_model import BodyPart, SceneModel
     from results_schema.quantities import Quantity
 
@@ -242,14 +242,18 @@ class Sensor:
         if sections is not None:
             return np.broadcast_to(sections.own_weight(self.quantity, x), stations)
         if self.offset_order == 0:
-            return np.broadcast_to(self._factor(model) * model.sag(self.body, x, self.reads.derivative), stations)
+            return np.broadcast_to(self._factor(model) * self._sag(model, x, self.reads.derivative), stations)
         if self.under is None:
             return np.zeros(stations)
         way = along[self.under]
-        slope = model.sag(self.body, x, 1)
+        slope = self._sag(model, x, 1)
         if self.offset_order == 1:
             return way.ds * slope
-        return np.asarray(way.ds**2 * model.sag(self.body, x, 2) + way.dds * slope)
+        return np.asarray(way.ds**2 * self._sag(model, x, 2) + way.dds * slope)
+
+    def _sag(self, model: SceneModel, x: Array, derivative: int) -> Array:
+        """(S,) derivative of its body's motion under own weight per unit gravity."""
+        return model.bodies[self.body].modal.own_weight_deflection(x, derivative)
 
     def sagging(self, model: SceneModel, along: Along) -> Array:
         """(stations,): its static reading by the body's own weight per unit gravity."""
@@ -263,6 +267,27 @@ class Sensor:
     def counted(self, model: SceneModel, along: Along) -> Mask:
         """(stations,) bool: whether it reads anything there."""
         return np.full(along[0].s.size, True) if self.under is None else along[self.under].on
+
+
+@dataclass(frozen=True, eq=False)
+class SideSensor(Sensor):
+    """The motion under a carriage along the track, or across it and its loads."""
+
+    direction: Direction = field(kw_only=True)
+
+    def shape(self, model: SceneModel, along: Along, derivative: int) -> Array:
+        assert self.under is not None
+        body = model.bodies[self.body].modal
+        return np.asarray(along[self.under].shapes(body, derivative, self.direction)[derivative])
+
+    def _full(self, model: SceneModel, along: Along, attachment: Attachment) -> Array:
+        modal, loaded, x = self._modal(model), place(attachment, along), self.places(along)
+        if isinstance(loaded, str):
+            return modal.sides[self.direction].of_point(loaded, x)
+        return modal.flexibility_between(x, loaded, (self.direction, attachment.direction))
+
+    def _sag(self, model: SceneModel, x: Array, derivative: int) -> Array:
+        return self._modal(model).sides[self.direction].own_weight_motion(x, derivative)
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from engine.kernels.layout import Observation
 from engine.observation.contact_forces import ContactForce, ContactSensor
 from engine.observation.dynamic_part import DynamicPart
-from engine.observation.readings import Sensor, SpotSensor, SprungSensor
+from engine.observation.readings import Sensor, SideSensor, SpotSensor, SprungSensor
 from results_schema.arrays import Array, Counts
 
 if TYPE_CHECKING:
@@ -48,6 +48,8 @@ def _sensor(model: SceneModel, name: str, carriages: list[str]) -> Sensor:
     if spec.spot is not None:
         return SpotSensor(name, spec.quantity, body, np.nan, None, limit=spec.frequency_limit)
     at = 0.0 if spec.at is None else spec.at
+    if under is not None and spec.side is not None:
+        return SideSensor(name, spec.quantity, body, at, under, direction=spec.side)
     if spec.carriage is None or under is None:
         return Sensor(name, spec.quantity, body, at, under, limit=spec.frequency_limit)
     springs = model.springs_of(under)

@@ -18,7 +18,7 @@ from results_schema.quantities import QUANTITIES
 from results_schema.variables import RESERVED
 
 if TYPE_CHECKING:
-    from engine.bodies.modal.modal_body import Direction
+    from engine.bodies.modal.modal_body import Direction, Side
     from engine.scene.study import Study
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
@@ -93,6 +93,17 @@ def _check_sensor(study: Study, name: str, sensor: Sensor) -> None:
     if sensor.spot is not None:
         with _within(study, here):
             study.body[body].check_spot(sensor.spot)
+    if sensor.side is not None and not study.frame:
+        _check_side(study, f"{here}.direction", body, sensor.side)
+
+
+def _check_side(study: Study, here: str, body: str, side: Side) -> None:
+    """A track moves in a direction beside that of its loads."""
+    rides = any(carriage.riding_body == body for carriage in study.carriage.values())
+    if rides or not study.body[body].moves(side):
+        what = f"body {body} rides itself" if rides else f"body {body} does not move {side} its own track"
+        expected = "a frame, or a body out of finite-element files" + " in space" * (side == "across")
+        raise study.source.fault(here, what, expected=expected, remedy="no direction: along gravity")
 
 
 def _check_quantity(study: Study, here: str, name: str, quantity: str) -> None:

@@ -10,11 +10,13 @@ from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
 from engine.bodies.frame.frame import Vector
 from engine.bodies.modal.description import Spot
+from engine.bodies.modal.modal_body import Side
 from engine.study_file.spec import LIST, NUMBER, WORD, Spec, by_form, form_of_amount, one_of
 from engine.study_file.units import Dimensionless, Frequency, Length, fault
 from results_schema.quantities import MEANT, QUANTITIES, Quantity
 
 AXES = ("x", "y", "z")
+SIDES: tuple[Side, ...] = ("along", "across")  # of a track, in which what rides is read
 MOST_PLACES = 201
 PLACES = 6  # ways to say where a sensor stands
 EXPECTED = 'at = metres, node, member or point = "its name", under = "a carriage", or carriage = "a carriage"'
@@ -40,7 +42,7 @@ OwnTolerance = Annotated[
 ]
 
 
-_Axis = Annotated[str, AfterValidator(one_of(*AXES))]
+_Axis = Annotated[str, AfterValidator(one_of(*AXES, *SIDES))]
 Direction = Annotated[Annotated[_Axis, Tag(WORD)] | Annotated[Vector, Tag(LIST)], by_form]
 NodeName = Annotated[Annotated[str, Tag(WORD)] | Annotated[int, Tag(NUMBER)], by_form]
 
@@ -85,6 +87,25 @@ def _check_error(sensor: Sensor) -> None:
         raise fault(what, expected='body = "a body" and at = metres along its track')
 
 
+def _check_direction(sensor: Sensor) -> None:
+    if sensor.direction is None:
+        return
+    if sensor.under is not None:
+        if sensor.side is None:
+            what, expected = "what moves with a carriage is read along its track or across", 'direction = "along"'
+            raise fault(what, expected=expected, received=f"direction = {sensor.direction!r}")
+        if sensor.reads.derivative or sensor.reads.of_support:
+            expected = "displacement, velocity or acceleration"
+            raise fault(f"a {sensor.quantity} has no direction", expected=f"quantity: {expected}")
+    elif sensor.side is not None:
+        what = f'only what moves with a carriage is read "{sensor.side}" a track'
+        raise fault(what, expected='under = "a carriage", or direction: one of x, y, z, or a vector')
+    elif not sensor.reads.of_arm and sensor.node is None and sensor.member is None:
+        expected = 'node or member = "its name"'
+        remedy = 'without direction; where frames move quantity = "position_error" has one'
+        raise fault("only nodes and members are read in a direction", expected=expected, remedy=remedy)
+
+
 def _check_drive(sensor: Sensor) -> None:
     if sensor.joint is not None and not sensor.reads.of_drive:
         raise fault("only drives are read at a joint", expected='quantity = "drive_torque" or "drive_force"')
@@ -96,11 +117,12 @@ def _check_drive(sensor: Sensor) -> None:
 
 class Sensor(Spec):
     """A quantity at a fixed place `at` (m along the track) of a body, at a node, a point, or a place of a member (`at`
-    m from its first node) in a direction (along gravity unless given), at the point that a carriage touches (`under`),
-    of a carriage's own sprung mass (`carriage`), the contact force of a carriage (of a body that rides, that at one
-    `contact`), what a support at a place of a beam or at a node carries (its moment at a node alone), how far a
-    place of a track is from where the rigid arm would have it (the length of that, or in a direction over the ground),
-    or what the drive of a `joint` of its body exerts (by number; the only one with a motion if not given).
+    m from its first node) in a direction (along gravity unless given), at the point that a carriage touches (`under`,
+    along gravity or "along" or "across" the track), of a carriage's own sprung mass (`carriage`), the contact force of
+    a carriage (of a body that rides, that at one `contact`), what a support at a place of a beam or at a node carries
+    (its moment at a node alone), how far a place of a track is from where the rigid arm would have it (the length of
+    that, or in a direction over the ground), or what the drive of a `joint` of its body exerts (by number; the only one
+    with a motion if not given).
 
     With `under` or `carriage`, the body is that of the carriage and need not be named. tolerance: of its own, in place
     of `solver.tolerance`; "told": its error is told and makes no status, as for velocities, accelerations and contact
@@ -150,15 +172,7 @@ class Sensor(Spec):
         _check_error(self)
         _check_drive(self)
         _check_part(self)
-        if self.direction is not None and not self.reads.of_arm and self.node is None and self.member is None:
-            of_arm = 'without direction; where frames move quantity = "position_error" has one'
-            remedy = (
-                "a node with direction where the carriage stops; beside the axis a point with offset and direction"
-                if self.under is not None
-                else of_arm
-            )
-            expected = 'node or member = "its name"'
-            raise fault("only nodes and members are read in a direction", expected=expected, remedy=remedy)
+        _check_direction(self)
         if self.spot is not None and (self.reads.derivative or self.reads.of_contact):
             known = ", ".join(name for name in quantities_of_a_body() if not QUANTITIES[name].derivative)
             expected, remedy = f"quantity: one of {known}", "at = metres along the track"
@@ -207,10 +221,17 @@ class Sensor(Spec):
         return self.carriage if self.under is None else self.under
 
     @property
+    def side(self) -> Side | None:
+        """The direction of its carriage's track in which it reads, if it does."""
+        return next((side for side in SIDES if side == self.direction), None)
+
+    @property
     def way_in_words(self) -> str:
         """The direction that it names, to stand behind its place: " along y"; "" where it names none."""
         if self.direction is None:
             return ""
+        if self.side is not None:
+            return f" {self.side} the track"
         named = (
             self.direction if isinstance(self.direction, str) else f"({', '.join(map('{:g}'.format, self.direction))})"
         )

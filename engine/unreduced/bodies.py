@@ -19,7 +19,7 @@ from engine.bodies.frame.frame import Frame
 from engine.bodies.frame.gauges import point_loads
 from engine.bodies.frame.geometry import unit
 from engine.bodies.frame.pushes import side_lines
-from engine.bodies.frame.track import track_of
+from engine.bodies.frame.track import Line, track_of
 from engine.bodies.modal.description import AUTO_MODES, Body
 from engine.bodies.modal.flexibility import Flexibility, factorised
 from engine.bodies.modal.modal_body import Direction
@@ -79,8 +79,8 @@ class FullBody:
 
     rigid (n, r): rigid-body motions of unit mass; pull (n,): own weight per unit gravity; flexibility: the elastic
     answer to loads, None where nothing bends; points: rows (n,) by name; sides: its track in other
-    directions than its loads', where it moves so; gauges: by the names of sensors;
-    gravity_share: of gravity along the track's direction.
+    directions than its loads', where it moves so; lines: their elements, and those of the track; gauges: by the names
+    of sensors; gravity_share: of gravity along the track's direction.
     """
 
     name: str
@@ -94,6 +94,7 @@ class FullBody:
     track: FrameTrack | RigidTrack
     points: dict[str, Array]
     sides: Mapping[Direction, AlongTrack | FrameTrack] = field(default_factory=dict)
+    lines: Mapping[Direction, Line] = field(default_factory=dict)
     gauges: Mapping[str, FullGauge] = field(default_factory=dict)
     gravity_share: float = 1.0
 
@@ -187,7 +188,8 @@ def _only_bending(assembly: Assembly) -> Assembly:
 def _assembled(study: Study, name: str, frame: Frame, assembly: Assembly) -> FullBody:
     flexibility = factorised(assembly.stiffness, assembly.mass, assembly.rigid)
     track, ends = track_of(frame, assembly.mesh)
-    gravity = unit(frame.gravity)
+    gravity, sides = unit(frame.gravity), side_lines(frame, track)
+    spread = track.spread_weight(gravity)
     numbers, loads = point_loads(frame, assembly)
     read = FullRead(frame, assembly, track, ends)
     return FullBody(
@@ -199,9 +201,10 @@ def _assembled(study: Study, name: str, frame: Frame, assembly: Assembly) -> Ful
         pull=assembly.drag @ gravity,
         damping=_damping(study, name, frame, assembly, flexibility),
         flexibility=flexibility,
-        track=FrameTrack.of(track, ends, assembly, track.spread_weight(gravity)),
+        track=FrameTrack.of(track, ends, assembly, spread),
         points={word: loads[:, number] for word, number in numbers.items()},
-        sides={way: SIDE_TRACKS[way](line, ends, assembly) for way, line in side_lines(frame, track).items()},
+        sides={way: SIDE_TRACKS[way](line, ends, assembly, spread) for way, line in sides.items()},
+        lines={"load": track, **sides},
         gauges={sensor: full_gauge(read, spot) for sensor, spot in study.spots(name)},
         gravity_share=float(track.direction @ gravity),
     )

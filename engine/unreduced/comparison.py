@@ -23,7 +23,7 @@ from engine.model.timeline import refined
 from engine.observation.histories import counts_shown
 from engine.scene.study import Study
 from engine.scene.variants import VariantValues
-from engine.unreduced.march import Course, march_unreduced
+from engine.unreduced.march import Course, check_march, march_unreduced
 from engine.unreduced.rows import Along
 from engine.unreduced.scene import contacts_of, unreduced_model
 from engine.unreduced.statics import statics_at
@@ -94,7 +94,7 @@ def compare_variant(plan: Plan, variant: int, spent: Flat, check: Callable[[], N
 def check_unreduced(study: Study) -> None:
     """Refuse a study that asks for the unreduced model and has none, by its scene without sweep. Raises BadInput."""
     if study.output.unreduced and study.carriage:
-        unreduced_model(study.without_sweep())
+        check_march(unreduced_model(study.without_sweep()))
 
 
 def reading_contacts(study: Study) -> Study:

@@ -71,8 +71,9 @@ def march_unreduced(
 ) -> Unfolded:
     """March from rest or from static equilibrium, as the study says; histories at stations by their count, ascending.
 
-    check: called after every segment, to stop by what it raises. Raises BadInput as `statics_at`.
+    check: called after every segment, to stop by what it raises. Raises BadInput as `statics_at` and `check_march`.
     """
+    check_march(model)
     march = _March(model, course, counts, level_readings(model), *_start(model, course))
 
     def halted() -> bool:
@@ -82,6 +83,20 @@ def march_unreduced(
     with np.errstate(all="ignore"):
         go(march, course.timeline.segments, halted)
     return Unfolded(march.sensors, march.forces)
+
+
+def check_march(model: Unreduced) -> None:
+    """Refuse masses that hold on beside the axis of their track: a march follows them by derivatives along it, and
+    elements that turn linearly between their ends lack the curvature of that. Raises BadInput."""
+    for tie in model.ties:
+        line = model.bodies[tie.body].lines.get(tie.direction)
+        if line is not None and line.turns and tie.link not in ("force", "spring"):
+            raise model.study.source.fault(
+                f"body.{tie.body}.track.offset",
+                "the unreduced model does not march masses beside the axis of their track",
+                expected="no offset, or unreduced = 0",
+                remedy=f"{tie.carriage} as an oscillator on a stiff spring is marched, no inertia along or across",
+            )
 
 
 def along_segment(model: Unreduced, course: Course, segment: Segment) -> Along:

@@ -9,8 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from engine.bodies.modal.modal_body import Side
 from engine.model.rider import Rider
 from engine.scene.sensors import Sensor
+from engine.unreduced.bodies import Track
 from engine.unreduced.scene import Tie, Unreduced, contacts_of
 from engine.unreduced.track import WIDTH, Rows, no_rows
 from results_schema.arrays import Array, Counts, Mask
@@ -83,7 +85,7 @@ def softness(model: Unreduced, along: Along) -> Array:
     for i, j in _together(model):
         one, other = model.ties[i], model.ties[j]
         on = along.on[:, one.rider] & along.on[:, other.rider]
-        within = model.line(one).within(along.s[:, one.rider], along.s[:, other.rider])
+        within = model.within(one, other, along.s[:, one.rider], along.s[:, other.rider])
         found[:, i, j] = np.where(on, within, 0.0)
     for i, one in enumerate(model.ties):
         for j, other in enumerate(model.ties):
@@ -111,7 +113,7 @@ def softness_slopes(model: Unreduced, along: Along) -> tuple[Array, Array]:
             continue
         track = model.line(one)
         (place, step), (load, _) = track.inside(along.s[:, one.rider]), track.inside(along.s[:, other.rider])
-        before, here, after = (track.within(place + k * step, load + k * step) for k in (-1, 0, 1))
+        before, here, after = (model.within(one, other, place + k * step, load + k * step) for k in (-1, 0, 1))
         on = along.on[:, one.rider] & along.on[:, other.rider]
         first[:, i, j] = np.where(on, (after - before) / (2.0 * step), 0.0)
         second[:, i, j] = np.where(on, (after - 2.0 * here + before) / step**2, 0.0)
@@ -119,10 +121,10 @@ def softness_slopes(model: Unreduced, along: Along) -> tuple[Array, Array]:
 
 
 def _together(model: Unreduced) -> Iterator[tuple[int, int]]:
-    """Pairs of a tie whose force is not given and one on the same body in the same direction."""
+    """Pairs of a tie whose force is not given and one on the same body."""
     for i, one in enumerate(model.ties):
         for j, other in enumerate(model.ties):
-            if one.link != "force" and one.body == other.body and one.direction == other.direction:
+            if one.link != "force" and one.body == other.body:
                 yield i, j
 
 
@@ -200,6 +202,11 @@ def _place(model: Unreduced, sensor: Sensor, along: Along) -> tuple[Array, int |
     return along.s[:, rider], rider
 
 
+def _track(model: Unreduced, body: str, sensor: Sensor) -> Track:
+    """The track on which a sensor reads, in its direction."""
+    return model.bodies[body].track if sensor.side is None else model.bodies[body].sides[sensor.side]
+
+
 def _parts(model: Unreduced, name: str, sensor: Sensor, along: Along) -> _Parts:
     count = len(along.s)
     none = np.zeros((count, WIDTH))
@@ -211,7 +218,7 @@ def _parts(model: Unreduced, name: str, sensor: Sensor, along: Along) -> _Parts:
         rows.values[:, 0] = 1.0
         return _of_rate(rows, sensor)
     body = model.study.body_of(name)
-    track, first = model.bodies[body].track, model.firsts[body]
+    track, first = _track(model, body, sensor), model.firsts[body]
     if sensor.spot is not None:
         gauge = model.bodies[body].gauges[name]
         rows = gauge.rows.moved(first).repeated(count)
@@ -221,7 +228,7 @@ def _parts(model: Unreduced, name: str, sensor: Sensor, along: Along) -> _Parts:
     place, rider = _place(model, sensor, along)
     rate = sensor.reads.rate
     if sensor.reads.of_section:
-        moved, inertia = track.sections(sensor.quantity, place)
+        moved, inertia = model.bodies[body].track.sections(sensor.quantity, place)
         return _Parts(moved.moved(first), none, inertia.values)
     shape = track.rows(place).moved(first)
     if rate == 0:
@@ -248,6 +255,8 @@ def _of_rate(rows: Rows, sensor: Sensor) -> _Parts:
 def _between_ends(model: Unreduced, name: str, sensor: Sensor, along: Along) -> tuple[Array, Array]:
     """(S, T) what the ties' forces on the sensor's own element add, and (S,) what own weight on it does."""
     body = model.study.body_of(name)
+    if sensor.side is not None:
+        return _between_ends_of_side(model, body, sensor.side, sensor, along)
     track, gauge = model.bodies[body].track, model.bodies[body].gauges.get(name)
     place, _ = _place(model, sensor, along)
     forces = np.zeros((len(along.s), len(model.ties)))
@@ -267,4 +276,17 @@ def _between_ends(model: Unreduced, name: str, sensor: Sensor, along: Along) -> 
     if model.study.body[body].own_weight and body not in model.loose:
         spread = track.under_weight(place, sensor.quantity) if gauge is None else gauge.under_weight
         added += spread * model.study.gravity
+    return forces, added
+
+
+def _between_ends_of_side(model: Unreduced, body: str, side: Side, sensor: Sensor, along: Along) -> tuple[Array, Array]:
+    """The same of a sensor along its track or across, which carriages alone push."""
+    lines, (place, _) = model.bodies[body].lines, _place(model, sensor, along)
+    forces, added = np.zeros((len(along.s), len(model.ties))), np.zeros(len(place))
+    for j, tie in enumerate(model.ties):
+        if tie.body == body:
+            between = lines[side].within(place, along.s[:, tie.rider], loads=lines[tie.direction])
+            forces[:, j] = np.where(along.on[:, tie.rider], between, 0.0)
+    if model.study.body[body].own_weight:
+        added += _track(model, body, sensor).under_weight(place) * model.study.gravity
     return forces, added

@@ -131,6 +131,14 @@ class Unreduced:
         body = self.bodies[tie.body]
         return body.track if tie.direction == "load" else body.sides[tie.direction]
 
+    def within(self, one: Tie, other: Tie, x: Array, s: Array) -> Array:
+        """(S,) m/N: what the element between its ends adds under a tie at x per unit force of another one on its body
+        at s."""
+        if one.direction == other.direction:
+            return self.line(one).within(x, s)
+        lines = self.bodies[one.body].lines
+        return lines[one.direction].within(x, s, loads=lines[other.direction])
+
     def part(self, body: str) -> slice:
         """A body's degrees of freedom."""
         return slice(self.firsts[body], self.firsts[body] + self.bodies[body].size)

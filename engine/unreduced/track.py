@@ -159,18 +159,17 @@ class AlongTrack:
         """As of `FrameTrack`."""
         return self.axis.inside(s)
 
+    def under_weight(self, x: Array) -> Array:
+        """(S,) what own weight on the element adds, per unit gravity."""
+        return self.line.under_spread_load(x, self.axis.spread)
 
-def along_track(line: PushedLine, ends: TrackPoints, assembly: Assembly) -> AlongTrack:
+
+def along_track(line: PushedLine, ends: TrackPoints, assembly: Assembly, spread: Array) -> AlongTrack:
     """The motion of a track along itself in an assembly's numbers of degrees of freedom."""
-    return AlongTrack(line, *(side_track(part, ends, assembly) for part in (line.axis, line.beside)))
+    return AlongTrack(line, *(FrameTrack.of(part, ends, assembly, spread) for part in (line.axis, line.beside)))
 
 
-def side_track(track: TrackBeams, ends: TrackPoints, assembly: Assembly) -> FrameTrack:
-    """A track in another direction than its loads', likewise."""
-    return FrameTrack.of(track, ends, assembly, np.zeros_like(track.axes[:, 0]))
-
-
-SIDE_TRACKS: Mapping[Direction, Callable[[Any, TrackPoints, Assembly], FrameTrack | AlongTrack]] = {
+SIDE_TRACKS: Mapping[Direction, Callable[[Any, TrackPoints, Assembly, Array], FrameTrack | AlongTrack]] = {
     "along": along_track,
-    "across": side_track,
+    "across": FrameTrack.of,
 }

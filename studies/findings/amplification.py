@@ -54,7 +54,7 @@ def told_amplification(results: Results, sensor: str) -> Array:
     by their inertia, which no static value counts."""
     own, body = results.study.sensor[sensor], results.study.body_of(sensor)
     pushed = any(one.on == body and one.pushes for one in results.study.carriage.values())
-    aside = own.point is not None and not results.study.body[body].deflects_down(own.point)
+    aside = own.side is not None or (own.point is not None and not results.study.body[body].deflects_down(own.point))
     if pushed and (aside or own.way[:2] != (0.0, 0.0)):
         return np.full(results.shape, np.nan)
     return results.numbers("dynamic_amplification", sensor)

@@ -145,7 +145,7 @@ class Results:
             spot = f"at {own.contact} " if own.contact else ""
             sprung = own.reads.of_mass and self.study.carriage[own.rides].suspension is not None
             of = "of the sprung mass of" if sprung else "of"
-            return f"{spot}{'under' if own.under else of} {own.rides}"
+            return f"{spot}{'under' if own.under else of} {own.rides}{own.way_in_words}"
         if own.reads.of_drive:
             return f"of {own.body}" if own.joint is None else f"of joint {own.joint} of {own.body}"
         if own.at is None:

@@ -247,9 +247,11 @@ class Frame(Body):
     def check_spot(self, spot: Spot) -> None:
         check_spot(self, spot)
 
+    def moves(self, direction: Direction) -> bool:
+        return direction != "across" or self.plane is None
+
     def check_inertia(self, direction: Direction) -> None:
-        if direction == "across" and self.plane is not None:
-            super().check_inertia(direction)
+        super().check_inertia(direction)
         check_square(direction, self.line.tangent, self.line.direction, unit(self.gravity))
 
     def place(self, node: str) -> Triple:

@@ -19,8 +19,8 @@ from engine.bodies.frame.geometry import across
 from engine.bodies.frame.sections import TrackSections
 from engine.bodies.frame.shapes import AlongShapes, ModeForces, track_shapes
 from engine.bodies.frame.statics import TrackInfluence, TrackStatics
-from engine.bodies.frame.track import Line, TrackBeams, held_turning
-from engine.bodies.modal.modal_body import Array, Direction, Points, Shapes
+from engine.bodies.frame.track import Line, TrackBeams, held_turning, track_places
+from engine.bodies.modal.modal_body import Array, Direction, Points, Shapes, refuse_loose
 from results_schema.arrays import Counts
 
 if TYPE_CHECKING:
@@ -48,6 +48,11 @@ class PushedLine:
     def places(self) -> Array:
         """(E + 1,) ends of its elements, m."""
         return self.axis.places
+
+    @property
+    def turns(self) -> bool:
+        """Whether it stands off its axis so that its loads turn the elements."""
+        return self.lever > 0.0
 
     def at(self, s: Array) -> tuple[Counts, Array]:
         """(S,) elements, from the right at a joint, and places in them."""
@@ -77,6 +82,11 @@ class PushedLine:
         """(4, S) extension, bending and twist of such an element at x under a unit force along at s."""
         turned = self.beside.held_parts(x, s, derivative, held_turning)
         return np.asarray(self.axis.held_parts(x, s, derivative) - self.lever * turned)
+
+    def under_spread_load(self, x: Array, load: Array, derivative: int = 0) -> Array:
+        """(S,) d^j/dx^j of the motion along at x of elements with held ends, as of `TrackBeams`."""
+        turned = self.beside.under_spread_load(x, load, derivative + 1)
+        return np.asarray(self.axis.under_spread_load(x, load, derivative) - self.lever * turned)
 
 
 SideLine = PushedLine | TrackBeams
@@ -114,6 +124,14 @@ class PushStatics:
         """Of the motion in a direction."""
         return self.deflection if direction == "load" else self._by_line[direction]
 
+    def own_weight(self, direction: Direction, x: ArrayLike, derivative: int) -> Array:
+        """d^j/dx^j of the motion in a direction at `x` (X,) under own weight per unit gravity."""
+        motion, statics = self.influence(direction), self.deflection
+        refuse_loose(statics.rigid)
+        x = track_places(x, statics.length)
+        between = motion.track.under_spread_load(x, statics.spread, derivative)
+        return np.asarray(motion.under_response(statics.weight, x, derivative) + between)
+
     @cached_property
     def _by_line(self) -> dict[Direction, TrackInfluence]:
         """By the lines of other directions; each keeps its cubics."""
@@ -150,6 +168,11 @@ class FrameSide:
         """d^j/dx^j of the motion in a direction at `x` per unit force at `s`, m^(1-j)/N, for pairs that are broadcast
         against each other."""
         return self.statics.influence(direction).influence_at(x, s, derivative)
+
+    def own_weight_motion(self, x: ArrayLike, derivative: int = 0) -> Array:
+        """d^j/dx^j of the motion at `x` (X,) under own weight per unit gravity. Raises BadInput for a frame without
+        supports."""
+        return self.statics.own_weight(self.direction, x, derivative)
 
     def section_at(self, quantity: str, x: ArrayLike, s: ArrayLike) -> Array:
         """A section force, stress or strain at `x` per unit force at `s`, likewise."""

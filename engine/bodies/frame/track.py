@@ -36,6 +36,9 @@ class Line(Protocol):
     @property
     def places(self) -> Array: ...
 
+    @property
+    def turns(self) -> bool: ...
+
     def at(self, s: Array) -> tuple[Counts, Array]: ...
 
     def to_ends(self, s: Array, derivative: int = 0) -> Array: ...
@@ -45,6 +48,8 @@ class Line(Protocol):
     def within(self, x: Array, s: Array, derivative: int = 0, loads: Line | None = None) -> Array: ...
 
     def held_parts(self, x: Array, s: Array, derivative: int) -> Array: ...
+
+    def under_spread_load(self, x: Array, load: Array, derivative: int = 0) -> Array: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +79,11 @@ class TrackBeams:
     def torque(self) -> Array:
         """(E,) twisting moment of the unit load, m."""
         return np.asarray(self.axes[:, 0] @ np.cross(self.offset, self.direction))
+
+    @property
+    def turns(self) -> bool:
+        """Whether it stands off its axis so that its loads twist the elements."""
+        return bool(np.abs(self.torque).max() > _END * np.ptp(self.places))
 
     def at(self, s: Array) -> tuple[Counts, Array]:
         """(S,) elements, from the right at a joint, and places in them."""

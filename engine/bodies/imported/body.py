@@ -131,15 +131,17 @@ class _Pushes:
         tracks = {"load": track_rows(body, held), **sides}
         gauges = [_node_load(body, held, spot.node, spot.direction)[:, None] for _, spot in self.spots]
         told = [told_along(body, held).T] if body.recovered else []
-        parts = [*(rows for rows, _ in tracks.values()), *map(sparse.csc_array, (loads, *gauges, *told))]
+        pull = held.drag @ unit(body.gravity_direction)
+        parts = [*(rows for rows, _ in tracks.values()), *map(sparse.csc_array, (pull[:, None], loads, *gauges, *told))]
         ends, found = np.cumsum([part.shape[1] for part in parts])[:-1], {}
         for direction, (rows, slopes) in sides.items():
             moved = np.split(_between(held.flexibility, sparse.hstack(parts).tocsc(), rows) @ slopes.T, ends)
             lines = zip(tracks.items(), moved, strict=False)
-            points, *others = moved[len(tracks) :]
+            weight, points, *others = moved[len(tracks) :]
             found[direction] = LinePushes(
                 {way: replace(self.statics, flexibility=own @ part) for (way, (_, own)), part in lines},
                 self.sections.under_loads(*others[len(gauges) :]),
+                weight[0],
                 dict(zip(names, points, strict=True)),
                 {name: part[0] for (name, _), part in zip(self.spots, others, strict=False)},
             )

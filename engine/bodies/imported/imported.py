@@ -206,14 +206,17 @@ class Imported(Body):
         free = [row >= 0 and not self.model.held[row] for row in self.model.rows_of(place)[:3]]
         return any(abs(way[axis]) > _ROUNDED and free[axis] and DIRECTIONS[axis] not in held for axis in range(3))
 
-    def check_inertia(self, direction: Direction) -> None:
+    def moves(self, direction: Direction) -> bool:
         if self.recorded is not None:
-            return
-        tangent, load = self.line.tangent, unit(self.direction)
-        way = tangent if direction == "along" else across(tangent, load)
-        if not any(self._moves(int(node), way) for node in self.line.nodes):
-            super().check_inertia(direction)
-        check_square(direction, tangent, load, unit(self.gravity_direction))
+            return True
+        tangent = self.line.tangent
+        way = tangent if direction == "along" else across(tangent, unit(self.direction))
+        return any(self._moves(int(node), way) for node in self.line.nodes)
+
+    def check_inertia(self, direction: Direction) -> None:
+        super().check_inertia(direction)
+        if self.recorded is None:
+            check_square(direction, self.line.tangent, unit(self.direction), unit(self.gravity_direction))
 
     def _check_track_rows(self) -> None:
         """The nodes of the track have rows in the direction of the loads, unless what they lack counts as held."""

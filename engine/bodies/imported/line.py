@@ -177,10 +177,12 @@ LineSections = LineRecovered | NoSections
 
 class LinePushes(NamedTuple):
     """What unit forces on a track in another direction than its loads' do: to its motions by direction, to stress and
-    strain; and (2 P,) motions of its nodes in that direction per unit force at points and gauges, by name."""
+    strain; and (2 P,) motions of its nodes in that direction under own weight per unit gravity, and per unit force at
+    points and gauges, by name."""
 
     motions: Mapping[Direction, LineStatics]
     sections: LineSections
+    weight: Array
     points: Mapping[str, Array]
     gauges: Mapping[str, Array]
 
@@ -203,6 +205,14 @@ class LineSide:
         """d^j/dx^j of the motion in a direction at `x` per unit force at `s`, m^(1-j)/N, for pairs that are broadcast
         against each other."""
         return self.find().motions[direction].influence_at(x, s, derivative)
+
+    def own_weight_motion(self, x: ArrayLike, derivative: int = 0) -> Array:
+        """d^j/dx^j of the motion at `x` (X,) under own weight per unit gravity. Raises BadInput for a body that nothing
+        holds."""
+        pushes = self.find()
+        motion = pushes.motions[self.direction]
+        refuse_loose(motion.rigid)
+        return motion.under_response(pushes.weight, x, derivative)
 
     def section_at(self, quantity: str, x: ArrayLike, s: ArrayLike) -> Array:
         """Stress or strain at `x` per unit force at `s`, likewise."""

@@ -207,8 +207,14 @@ class Body(SpecOfKind):
         """The springs on which a uniform beam stands instead, each with `at`, `stiffness` and `rotational`."""
         return ()
 
+    def moves(self, direction: Direction) -> bool:
+        """Whether its track moves in a direction beside that of its loads."""
+        return False
+
     def check_inertia(self, direction: Direction) -> None:
         """Raise BadInput where the inertia of what rides cannot act in a direction."""
+        if self.moves(direction):
+            return
         where = f"inertia_{direction}"
         what = f"this body does not move {direction} its own track, so its deflection does not depend on this key"
         expected = "a frame, or a body out of finite-element files" + " in space" * (direction == "across")

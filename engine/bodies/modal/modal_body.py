@@ -21,7 +21,8 @@ SAME_PLACE = 1e-9
 
 
 #: In which a contact pushes on its track and feels it move: as its loads act, along it, or across both.
-Direction = Literal["load", "along", "across"]
+Side = Literal["along", "across"]
+Direction = Literal["load"] | Side
 
 
 class Shapes(Protocol):
@@ -56,6 +57,10 @@ class SideMotion(Protocol):
     def influence_at(self, direction: Direction, x: ArrayLike, s: ArrayLike, derivative: int = 0) -> Array:
         """d^j/dx^j of the motion in a direction at `x` per unit force in its own at `s`, m^(1-j)/N, for pairs that are
         broadcast against each other."""
+
+    def own_weight_motion(self, x: ArrayLike, derivative: int = 0) -> Array:
+        """d^j/dx^j of the motion at `x` (X,) under the body's own weight, per unit gravity. Raises BadInput for a body
+        that nothing holds."""
 
     def section_at(self, quantity: str, x: ArrayLike, s: ArrayLike) -> Array:
         """A section force, stress or strain at `x` per unit force at `s`, likewise."""
