@@ -152,7 +152,7 @@ MISTAKES = {
     "one slip of several": (SMALL.replace('on = "beam"', 'on = "baem"'), 2, ['on: no such body', 'mean "beam"?']),
     "a direction under a carriage": (
         f'{SMALL}\n[sensor.sway]\nunder = "trolley"\ndirection = "x"\n',
-        2, ["sensor.sway", "a node with direction where the carriage stops; beside the axis a point"],
+        2, ["sensor.sway", "what moves with a carriage is read along its track", 'direction = "along"'],
     ),
     "braking of a body on contacts": (
         SMALL.replace('kind = "mass"\nmass = 1.0', 'kind = "body"\nbody = "table"\ninertia_along = true'),
