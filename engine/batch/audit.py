@@ -72,11 +72,14 @@ class Audit(NamedTuple):
 def sampled(plan: Plan) -> Counts:
     """The variants to audit, drawn at random by the study alone: where their number is left open 1 % of them, 16 to
     256, as many as take 30 % of the run's time or 2 s."""
-    wanted = plan.study.solver.audit
-    if wanted == 0:
-        return np.zeros(0, dtype=np.int64)
     pilots = np.zeros(0, dtype=np.int64) if plan.choice is None else plan.choice.pilots
-    return drawn(plan.size, audit_size(plan) if wanted == "auto" else int(wanted), pilots)
+    return drawn(plan.size, audited(plan), pilots)
+
+
+def audited(plan: Plan) -> int:
+    """How many variants are audited."""
+    wanted = plan.study.solver.audit
+    return audit_size(plan) if wanted == "auto" else min(int(wanted), plan.size)
 
 
 def drawn(size: int, count: int, but: Counts | tuple[()] = ()) -> Counts:
@@ -90,11 +93,26 @@ def audit_size(plan: Plan) -> int:
     if plan.choice is None:
         return enough(plan.size, plan.seconds, partial(_seconds, plan, _works_of_some(plan)))
     # What pilots and their references took, in the mean, is known.
-    measured, units = plan.choice.measured, float(np.mean([passages(grid) for grid in plan.grids]))
-    pilots = usual_pilots(plan.size) * measured.work / plan.choice.pilots.size
-    further = FURTHER * float(measured.spent.mean())
-    whole = plan.seconds + units * pilots / PACE
-    return enough(plan.size, whole, lambda count: (TABLES_OF_AUDITS + units * further * count) / PACE)
+    pilots = usual_pilots(plan.size) * plan.choice.measured.work / plan.choice.pilots.size
+    return enough(plan.size, plan.seconds + _units(plan) * pilots / PACE, partial(_by_references, plan))
+
+
+def audit_seconds(plan: Plan) -> float:
+    """Expected time at PACE, on one thread, of the audit of a plan whose pilots are measured."""
+    count = audited(plan)
+    return _by_references(plan, count) if count else 0.0
+
+
+def _by_references(plan: Plan, count: int) -> float:
+    """The same of so many variants, by what the references of pilots took."""
+    assert plan.choice is not None
+    further = FURTHER * float(plan.choice.measured.spent.mean())
+    return (TABLES_OF_AUDITS + _units(plan) * further * count) / PACE
+
+
+def _units(plan: Plan) -> float:
+    """Passages or cycles of a march, in the mean of the scenes."""
+    return float(np.mean([passages(grid) for grid in plan.grids]))
 
 
 def enough(size: int, whole: float, seconds: Callable[[int], float]) -> int:

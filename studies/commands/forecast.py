@@ -10,6 +10,7 @@ from typing import NamedTuple
 from engine.accuracy.choice import PILOTS, pilots_of, scenes_of_pilots, usual_pilots
 from engine.accuracy.groups import ConvergingGroup, Group
 from engine.accuracy.jobs import Job
+from engine.batch.audit import audit_seconds, audited
 from engine.batch.execution import warm_up
 from engine.batch.executors import Place, Shared, in_processes, place
 from engine.batch.plan import NOBODY, Plan
@@ -23,14 +24,12 @@ from studies.results.formatting import counted
 from studies.results.places import spread
 
 SECONDS = 3.0  # that measuring may take
-PATIENCE = 10.0  # the same until some variants have converged: of a run of minutes nothing is known before
+PATIENCE = 10.0  # the same until the first pilots are measured, or variants have converged: nothing is known before
 ROUNDS = (16, 64, PILOTS)  # pilots, as long as the next round is expected to end in time
-FIRST = 4  # pilots before these, where there are several scenes: of one to four, for which there is more patience
-# What is said of the next seven was measured with the built-in studies on two threads; the spread is over these.
-CLIMB = 10.0  # times the convergence of a few variants that pilots take on the ladder: 2 to 23
-MARCHED = 0.07  # of that convergence that a scene's march takes by what pilots tell: of swept motions on frames
+FIRST = 4  # pilots before these, where there are several scenes: of one to four
+# What is said of the next five was measured with the built-in studies on two threads; the spread is over these.
 BROKEN_OFF = 2.5  # times the seconds after which some pilots were broken off that all of them take: 2 to 3
-AUDIT = 1.7  # times that convergence that an audit takes, one level beyond it: 1.1 to 4.3
+AUDIT = 1.7  # times the convergence of some variants that an audit takes, one level beyond it: 1.1 to 4.3
 UNFINISHED = 2.0  # times the seconds in which variants did not converge that they take
 AROUND = 1.6  # times loading and planning: gathering and writing take about half as much
 LONGER = 2.5  # times a round that the next one takes: four times the pilots by the same tables
@@ -73,20 +72,19 @@ def forecast(
     patience: float = PATIENCE,
     compiled: float = 0.0,
 ) -> Forecast:
-    """What is measured within so many seconds: how some variants converge, for which there is more ``patience``, then
-    as many pilots as there is time for. That kernels are compiled does not count; compiled: seconds of that before."""
+    """What is measured within so many seconds: as many pilots as there is time for, or how some variants converge;
+    first of all there is more ``patience``. That kernels are compiled does not count; compiled: seconds of that
+    before."""
     around = AROUND * (time.process_time() - compiled)
     warm_up(plan)
-    groups = [ConvergingGroup(*scene) for scene in zip(plan.grids, plan.members, strict=True)]
     with clock_without_compiling() as clock:
         until = Time(clock() + seconds, clock() + patience, clock)
-        looked = _converge(plan, groups, until)
         if plan.converges:
-            found = _of_convergence(plan, looked, threads)
+            found = _of_convergence(plan, _converge(plan, until), threads)
         else:
             with _where_it_runs(plan, threads) as here:
-                found = _choose(plan, here, looked, until, rounds)
-    return found._replace(seconds=found.seconds + around + _audit(found.plan, looked, threads))
+                found = _choose(plan, here, until, rounds)
+    return found._replace(seconds=found.seconds + around)
 
 
 def _where_it_runs(plan: Plan, threads: int) -> AbstractContextManager[Place]:
@@ -95,11 +93,8 @@ def _where_it_runs(plan: Plan, threads: int) -> AbstractContextManager[Place]:
 
 
 def _audit(plan: Plan, looked: Looked, threads: int) -> float:
-    """Seconds of the audit, whose scenes are shared out."""
-    from engine.batch.audit import audit_size
-
-    wanted = plan.study.solver.audit
-    scenes = min(len(plan.grids), audit_size(plan) if wanted == "auto" else int(wanted))
+    """Seconds of the audit of variants that converge, whose scenes are shared out."""
+    scenes = min(len(plan.grids), audited(plan))
     return AUDIT * looked.seconds * scenes / min(threads, max(scenes, 1))
 
 
@@ -107,8 +102,9 @@ def _past(end: float, clock: Callable[[], float]) -> bool:
     return clock() > end
 
 
-def _converge(plan: Plan, groups: Sequence[Group], until: Time) -> Looked:
+def _converge(plan: Plan, until: Time) -> Looked:
     """Some variants of a few scenes, as they converge, as long as there is time."""
+    groups = [ConvergingGroup(*scene) for scene in zip(plan.grids, plan.members, strict=True)]
     halted, clock = partial(_past, until.last, until.clock), until.clock
     parts: list[chosen.Part] = []
     took, some = [], [groups[place] for place in spread(len(groups), SCENES)]
@@ -128,6 +124,7 @@ def _of_convergence(plan: Plan, looked: Looked, threads: int) -> Forecast:
     # Each has tables of its own. They take longer than its marches, and two threads hardly make them at the same time.
     chunks = sum(1 for _ in plan.chunks(None, None))
     seconds = looked.seconds * chunks / (threads if plan.many_scenes else 1) + plan.seconds / min(threads, chunks)
+    seconds += _audit(plan, looked, threads)
     if not looked.parts:
         less = f"{PATIENCE:.0f} seconds were not enough for a variant to converge: this may take longer"
         return Forecast(plan, "", (), seconds, less)
@@ -135,30 +132,24 @@ def _of_convergence(plan: Plan, looked: Looked, threads: int) -> Forecast:
     return Forecast(plan, title, chosen.rows(looked.parts), seconds)
 
 
-def _without_pilots(plan: Plan, looked: Looked, threads: int, tried: float) -> Forecast:
+def _without_pilots(plan: Plan, tried: float) -> Forecast:
     """A study whose pilots take longer than there is time; tried: seconds after which the first of them, of one scene
     or of a few, were broken off, 0 where there was no time to begin."""
     pilots = pilots_of(plan.cases, plan.members).size
-    first = f"pilots, variants that are measured first: a run has {pilots} of them"
-    less = f"there was no time for {first}, and takes what they show to be enough"
     scenes = scenes_of_pilots(len(plan.grids), plan.size, usual_pilots(plan.size))
     few = scenes_of_pilots(len(plan.grids), plan.size, FIRST)
-    seconds = max(BROKEN_OFF * tried * scenes / few, CLIMB * looked.seconds * scenes / min(threads, scenes))
-    seconds += MARCHED * looked.seconds * len(plan.grids) / (threads if plan.many_scenes else 1)
-    if not looked.parts:
-        return Forecast(plan, "", (), seconds, f"{less}; this may take longer")
-    title = f"What {counted(len(looked.parts), 'variant')} converged with; a run takes no more than it needs"
-    return Forecast(plan, title, chosen.rows(looked.parts), seconds, less)
+    more = "there was no time for pilots, variants that are measured first"
+    remark = f"{more}: a run has {pilots} of them, and takes what they show to be enough; this may take longer"
+    return Forecast(plan, "", (), BROKEN_OFF * tried * scenes / few, remark)
 
 
-def _choose(plan: Plan, here: Place, looked: Looked, until: Time, rounds: Sequence[int]) -> Forecast:
+def _choose(plan: Plan, here: Place, until: Time, rounds: Sequence[int]) -> Forecast:
     """More and more pilots, as many as there is time for."""
-    several, found, start, tried = len(plan.grids) > 1, None, 0.0, 0.0
-    expected = 0.0 if several else 0.5 * CLIMB * looked.seconds
-    for pilots in (*(FIRST,) * several, *rounds):
+    found, start, tried = None, 0.0, 0.0
+    for pilots in (*(FIRST,) * (len(plan.grids) > 1), *rounds):
         trial, started = replace(plan), until.clock()
-        end = until.last if several and found is None else until.usual
-        if not looked.parts or started + expected > end:
+        end, expected = (until.last, 0.0) if found is None else (until.usual, LONGER * found.took)
+        if started + expected > end:
             break
         share = Shared(here, partial(_past, end, until.clock))
         try:
@@ -170,9 +161,8 @@ def _choose(plan: Plan, here: Place, looked: Looked, until: Time, rounds: Sequen
             tried = until.clock() - started
             break
         found = _Round(trial, pilots, until.clock() - started)
-        expected = LONGER * found.took
     if found is None:
-        return _without_pilots(plan, looked, here.slots, tried)
+        return _without_pilots(plan, tried)
     return _of_pilots(found, here.slots, start, until.clock)
 
 
@@ -206,6 +196,7 @@ def _of_pilots(found: _Round, threads: int, start: float, clock: Callable[[], fl
     marched = plan.choice.measured.work * group.seconds_per_variant / group.work * pace
     again = max(0.0, drawn / measured - more_scenes / scenes) * marched
     pilots = found.took * more_scenes / scenes + again / threads
+    march += audit_seconds(plan) * pace
     return Forecast(plan, title, chosen.rows(chosen.chosen(plan)), start + pilots + march / threads)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from engine.accuracy.grids import SceneGrid
-from engine.batch.audit import audit_size
+from engine.batch.audit import audited
 from engine.batch.dataset import model_groups
 from engine.batch.plan import Plan
 from engine.batch.remarks_of_carriages import sprung
@@ -84,7 +84,7 @@ def _audit(seen: Forecast) -> str:
     wanted = seen.plan.study.solver.audit
     if wanted == "auto" and not seen.plan.converges and seen.plan.choice is None:
         return ""
-    return _audited(audit_size(seen.plan) if wanted == "auto" else min(int(wanted), seen.plan.size), wanted)
+    return _audited(audited(seen.plan), wanted)
 
 
 def _unreduced(plan: Plan) -> str:

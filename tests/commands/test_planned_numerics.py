@@ -7,10 +7,11 @@ from typing import Any
 import pytest
 
 from engine.accuracy.jobs import InTurn
+from engine.batch.audit import audit_seconds, audited
 from engine.batch.plan import Plan, make_plan
 from engine.scene.study import Study
 from studies.commands import forecast as forecasting
-from studies.commands.forecast import Looked, forecast
+from studies.commands.forecast import forecast
 from studies.commands.planned_numerics import HEADINGS, chosen, rows
 from studies.commands.preview import preview
 from studies.protocol.study import kind_of
@@ -82,12 +83,11 @@ def test_what_the_study_fixes_is_one_row() -> None:
     assert row[COLUMN["modes"]] == "5" and row[COLUMN["steps"]] == "1,200"
 
 
-@pytest.mark.parametrize("sweep", [{"speed": SPEEDS}, {"speed": SPEEDS, "mass": MASSES}])
-def test_some_variants_are_told_with_what_they_converged(sweep: dict[str, Any]) -> None:
-    seen = forecast(planned(beam(modes="auto"), sweep, tolerance=1e-2), 1, 1e9, ())
+def test_some_variants_are_told_with_what_they_converged() -> None:
+    seen = forecast(planned(beam(modes="auto"), {"speed": SPEEDS}, tolerance=1e-2), 1, 1e9, ())
     assert seen.title.startswith("What 8 variants converged with") and seen.seconds > 0.0
     assert sum(int(count) for count in column(list(seen.rows), "variants")) == 8
-    assert (seen.remark == "") == seen.plan.converges
+    assert seen.remark == "" and seen.plan.converges
 
 
 def test_compiling_kernels_is_no_part_of_what_is_forecast() -> None:
@@ -119,18 +119,6 @@ def test_what_there_was_no_time_for_is_said(sweep: dict[str, Any], words: str) -
     assert not seen.rows and words in seen.remark
 
 
-def test_scenes_of_pilots_are_shared_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each scene climbs the ladder by itself: of 40 scenes 128 pilots are of 16, on two threads eight after another."""
-    lengths = {"of": "body.bed.length", "from": 1.0, "to": 2.0, "count": 40}
-    found = planned(beam(modes="auto"), {"length": lengths, "speed": SPEEDS | {"count": 30}})
-    monkeypatch.setattr(forecasting, "_converge", lambda *_: Looked([], 2.0))
-    monkeypatch.setattr(forecasting, "_audit", lambda *_: 0.0)
-    monkeypatch.setattr(forecasting, "AROUND", 0.0)
-    marched = 40 * forecasting.MARCHED * 2.0
-    assert forecast(found, 2, -1.0).seconds == 8 * forecasting.CLIMB * 2.0 + marched / 2
-    assert forecast(found, 64, -1.0).seconds == forecasting.CLIMB * 2.0 + marched / 64
-
-
 def test_of_several_scenes_a_few_pilots_are_measured_with_more_patience() -> None:
     """Four of 40 scenes, which the title says; what all pilots take is told by these."""
     lengths = {"of": "body.bed.length", "from": 1.0, "to": 2.0, "count": 40}
@@ -144,9 +132,22 @@ def test_of_several_scenes_a_few_pilots_are_measured_with_more_patience() -> Non
     assert "there was no time for pilots" in hurried.remark
 
 
-def test_pilots_of_one_scene_that_are_broken_off_tell_of_those_of_all() -> None:
+@pytest.mark.parametrize(("lengths", "more"), [(1, 1), (40, 16)])
+def test_pilots_that_are_broken_off_tell_of_those_of_all(lengths: int, more: int) -> None:
     """Of 40 scenes 128 pilots are of 16, the first four of one."""
-    lengths = {"of": "body.bed.length", "from": 1.0, "to": 2.0, "count": 40}
-    found = planned(beam(modes="auto"), {"length": lengths, "speed": SPEEDS | {"count": 30}})
-    seen = forecasting._without_pilots(found, Looked([], 0.0), 1, 2.0)
-    assert seen.seconds == forecasting.BROKEN_OFF * 2.0 * 16
+    axis = {"of": "body.bed.length", "from": 1.0, "to": 2.0, "count": 40}
+    sweep = {"length": axis, "speed": SPEEDS | {"count": 30}} if lengths > 1 else {"speed": SPEEDS, "mass": MASSES}
+    seen = forecasting._without_pilots(planned(beam(modes="auto"), sweep), 2.0)
+    assert seen.seconds == forecasting.BROKEN_OFF * 2.0 * more
+
+
+def test_the_audit_of_what_pilots_tell_is_forecast(plan: Plan) -> None:
+    """More variants take longer, none take nothing."""
+    own = plan.study.solver.audit
+    assert own == "auto" and audited(plan) == 16
+    seconds = []
+    for count in (0, 16, 64):
+        other = planned(beam(modes="auto"), {"speed": SPEEDS, "mass": MASSES}, tolerance=1e-2, audit=count)
+        other.choice = plan.choice
+        seconds.append(audit_seconds(other))
+    assert seconds[0] == 0.0 < seconds[1] < seconds[2] and seconds[1] == audit_seconds(plan)
