@@ -7,6 +7,8 @@ from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
+import numpy as np
+
 from engine.accuracy.choice import PILOTS, pilots_of, scenes_of_pilots, usual_pilots
 from engine.accuracy.groups import ConvergingGroup, Group
 from engine.accuracy.jobs import Job
@@ -33,7 +35,7 @@ AUDIT = 1.7  # times the convergence of some variants that an audit takes, one l
 UNFINISHED = 2.0  # times the seconds in which variants did not converge that they take
 AROUND = 1.6  # times loading and planning: gathering and writing take about half as much
 LONGER = 2.5  # times a round that the next one takes: four times the pilots by the same tables
-CONVERGED, SCENES = 8, 3  # variants that converge, and scenes that they are of
+TOGETHER = 2  # variants of a scene that converge together
 TIMED = 1024  # variants by which the pace of the march is measured
 
 
@@ -57,10 +59,12 @@ class Time(NamedTuple):
 
 
 class Looked(NamedTuple):
-    """What some variants converged with, and the seconds that those of a scene take, in the mean of some scenes."""
+    """What some variants converged with; seconds that a few of a scene take, in the mean of all that are at work at the
+    same time; start: seconds until these are at work."""
 
     parts: list[chosen.Part]
     seconds: float
+    start: float = 0.0
 
 
 @one_thread()
@@ -79,10 +83,10 @@ def forecast(
     warm_up(plan)
     with clock_without_compiling() as clock:
         until = Time(clock() + seconds, clock() + patience, clock)
-        if plan.converges:
-            found = _of_convergence(plan, _converge(plan, until), threads)
-        else:
-            with _where_it_runs(plan, threads) as here:
+        with _where_it_runs(plan, threads) as here:
+            if plan.converges:
+                found = _of_convergence(plan, _converge(plan, here, until), here.slots)
+            else:
                 found = _choose(plan, here, until, rounds)
     return found._replace(seconds=found.seconds + around)
 
@@ -92,42 +96,52 @@ def _where_it_runs(plan: Plan, threads: int) -> AbstractContextManager[Place]:
     return in_processes({}) if plan.many_scenes and threads == cores() else place(threads)
 
 
-def _audit(plan: Plan, looked: Looked, threads: int) -> float:
-    """Seconds of the audit of variants that converge, whose scenes are shared out."""
-    scenes = min(len(plan.grids), audited(plan))
-    return AUDIT * looked.seconds * scenes / min(threads, max(scenes, 1))
-
-
 def _past(end: float, clock: Callable[[], float]) -> bool:
     return clock() > end
 
 
-def _converge(plan: Plan, until: Time) -> Looked:
-    """Some variants of a few scenes, as they converge, as long as there is time."""
-    groups = [ConvergingGroup(*scene) for scene in zip(plan.grids, plan.members, strict=True)]
-    halted, clock = partial(_past, until.last, until.clock), until.clock
-    parts: list[chosen.Part] = []
-    took, some = [], [groups[place] for place in spread(len(groups), SCENES)]
-    for group in some:
-        variants, started = group.variants[spread(group.variants.size, CONVERGED // len(some))], clock()
-        try:
-            parts += chosen.converged(plan, group.found(plan.values(group, variants), variants, None, halted))
-        except Halted:
-            took.append(UNFINISHED * (clock() - started))
+def _converge(plan: Plan, here: Place, until: Time) -> Looked:
+    """Some variants, a few of each of some scenes, as they converge where a run computes them."""
+    share = Shared(here, partial(_past, until.last, until.clock))
+    jobs, parts, started, done = _samples(plan, 2 * here.slots), list[chosen.Part](), until.clock(), 0
+    Shared(here)(plan, [Job(_awake, NOBODY)] * here.slots)
+    start, started = until.clock() - started, until.clock()
+    for some in (jobs[::2], jobs[1::2]):
+        if done and (until.clock() - started > until.usual - until.clock() or not some):
             break
-        took.append(clock() - started)
-    return Looked(parts, sum(took) / len(took))
+        try:
+            parts += [part for found in share(plan, some) for part in found]
+        except Halted:
+            return Looked(parts, UNFINISHED * (until.clock() - started) / len(some), start)
+        done += len(some)
+    return Looked(parts, (until.clock() - started) / done, start)
+
+
+def _samples(plan: Plan, count: int) -> list[Job[list[chosen.Part]]]:
+    """So many jobs or a few more, each that some variants of a scene converge, of scenes far apart."""
+    scenes, jobs = spread(len(plan.grids), count), list[Job[list[chosen.Part]]]()
+    each = -(-count // len(scenes))
+    for scene in scenes:
+        some = plan.members[scene][spread(plan.members[scene].size, each * TOGETHER)]
+        own = partial(_converged, scene=int(scene))
+        jobs += [Job(own, part) for part in np.array_split(some, each) if part.size]
+    return jobs
+
+
+def _converged(plan: Plan, lanes: Counts, halted: Callable[[], bool], scene: int) -> list[chosen.Part]:
+    """What some variants of a scene converge with."""
+    group = ConvergingGroup(plan.grids[scene], plan.members[scene])
+    return list(chosen.converged(plan, group.found(plan.values(group, lanes), lanes, None, halted)))
 
 
 def _of_convergence(plan: Plan, looked: Looked, threads: int) -> Forecast:
-    """A study whose variants all converge by themselves."""
-    # Each has tables of its own. They take longer than its marches, and two threads hardly make them at the same time.
+    """A study whose variants all converge by themselves, each chunk with tables of its own."""
     chunks = sum(1 for _ in plan.chunks(None, None))
-    seconds = looked.seconds * chunks / (threads if plan.many_scenes else 1) + plan.seconds / min(threads, chunks)
-    seconds += _audit(plan, looked, threads)
+    seconds = looked.start + looked.seconds * chunks + plan.seconds / min(threads, chunks)
     if not looked.parts:
         less = f"{PATIENCE:.0f} seconds were not enough for a variant to converge: this may take longer"
         return Forecast(plan, "", (), seconds, less)
+    seconds += AUDIT * looked.seconds * min(len(plan.grids), audited(plan))
     title = f"What {counted(len(looked.parts), 'variant')} converged with; in a run every variant does by itself"
     return Forecast(plan, title, chosen.rows(looked.parts), seconds)
 
