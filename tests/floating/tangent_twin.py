@@ -31,8 +31,8 @@ TERMS = {
 }
 
 
-def both(module: ModuleType, model: FloatingModel) -> tuple[np.ndarray, np.ndarray]:
-    """The tangent (N, N) by the module, and by central differences of the residual."""
+def both(model: FloatingModel, *modules: ModuleType) -> tuple[list[np.ndarray], np.ndarray]:
+    """The tangents (N, N) by the modules, and by central differences of the residual."""
     table = lanes(model, VariantValues(model.study, {}, 1), np.full(1, STEP))
     lane, N = Lane(*(in_blocks(part)[0] for part in table)), model.size
     blank = np.zeros((1, 1, STATISTICS, LANES))
@@ -40,9 +40,12 @@ def both(module: ModuleType, model: FloatingModel) -> tuple[np.ndarray, np.ndarr
     motions_at(lane.motions, np.zeros(LANES), np.zeros(LANES), solver.work.piece, solver.work.motions)
     for part, values in zip(state.tried, residual_twin.state(model, 1), strict=True):
         part[:] = values[:, None]
-    state.weight[:], solver.memory[module.SCALE] = 1.0, 0.1
+    state.weight[:], solver.memory[newton.SCALE] = 1.0, 0.1
     ways = BETA * STEP**2, GAMMA * STEP, 1.0
-    module.tangent(model.system, lane, state, *(np.full(LANES, way) for way in ways[:2]), solver)
+    found = []
+    for module in modules:
+        module.tangent(model.system, lane, state, *(np.full(LANES, way) for way in ways[:2]), solver)
+        found.append(solver.fresh[:, :, AT].copy())
     wanted, out = np.zeros((N, N)), np.zeros((N, LANES))
     for k in range(N):
         for sign in (1.0, -1.0):
@@ -51,13 +54,14 @@ def both(module: ModuleType, model: FloatingModel) -> tuple[np.ndarray, np.ndarr
                 part[k] += sign * way * 1e-3
             residual(model.system, lane, x, solver.work, out)
             wanted[:, k] += sign * out[:, AT] / 2e-3
-    return solver.fresh[:, :, AT], wanted
+    return found, wanted
 
 
 def main() -> None:
     model = build(loads_twin.study())
-    for name, module in (("tangent", newton), *((name, mutated(newton, *term)) for name, term in TERMS.items())):
-        found, wanted = both(module, model)
+    modules = {"tangent": newton} | {name: mutated(newton, *term) for name, term in TERMS.items()}
+    tangents, wanted = both(model, *modules.values())
+    for (name, module), found in zip(modules.items(), tangents, strict=True):
         gap = (np.abs(found - wanted).max(axis=0) / np.abs(wanted).max(axis=0)).max()
         print(f"{'' if module is newton else 'without '}{name}: {gap:.1e}")
         assert gap < AGREE if module is newton else gap > DIFFER, name

@@ -65,19 +65,17 @@ def test_the_archive_is_the_same(kind: str, tmp_path: Path, monkeypatch: pytest.
     assert sorted(tmp_path.iterdir()) == [path, path.with_suffix(".toml"), whole.path, whole.path.with_suffix(".toml")]
 
 
-def told(path: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> Sequence[str]:
-    """What the commands make of an archive."""
+def told(kind: str, path: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> Sequence[str]:
+    """What the report of a kind and a command, which knows no kinds, make of an archive."""
     folder.mkdir()
     said = []
-    for arguments in (
-        ("info", "--all"),
-        ("compare", path),
-        ("export", folder / "a.csv"),
-        ("report", "-o", folder / "r"),
-    ):
+    beside = {"passage": ("info", "--all"), "asymmetry": ("compare", path), "double-peak": ("export", folder / "a.csv")}
+    for arguments in (beside[kind], ("report", "-o", folder / "r")):
         assert command([arguments[0], str(path), *map(str, arguments[1:])]) == 0
         said.append(capsys.readouterr().out.replace(folder.name, ""))
-    return [*said, (folder / "a.csv").read_text(encoding="utf-8"), (folder / "r/report.html").read_text("utf-8")]
+    written = [file.read_text(encoding="utf-8") for file in (*folder.glob("*.csv"), folder / "r/report.html")]
+    assert len(written) == 1 + (kind == "double-peak")
+    return [*said, *written]
 
 
 def test_what_stays_on_the_disk_takes_no_memory(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -122,9 +120,9 @@ def test_commands_read_the_same(
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "0")
     path = ran(kind, tmp_path / "a.nc")
     capsys.readouterr()
-    expected = told(path, tmp_path / "one", capsys)
+    expected = told(kind, path, tmp_path / "one", capsys)
     on_disk_alone(monkeypatch)
-    assert told(path, tmp_path / "two", capsys) == expected
+    assert told(kind, path, tmp_path / "two", capsys) == expected
 
 
 def test_rows_come_back_in_the_order_of_variants(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
