@@ -13,12 +13,15 @@ import numpy as np
 
 from engine.kernels.modal_sums import sums_over_modes
 from engine.model.ties import Attachment
-from results_schema.arrays import Array, Counts
+from results_schema.arrays import Array, Counts, Mask
 
 if TYPE_CHECKING:
     from engine.bodies.modal.modal_body import ModalBody
     from engine.model.scene_model import SceneModel
     from engine.model.station_path import Along
+
+
+ROUNDED = 1e-12  # of the largest of a matrix: less is rounding
 
 
 def holds(attachment: Attachment, along: Along) -> bool:
@@ -116,8 +119,27 @@ def residual_rows(model: SceneModel, ties: Counts, missed: Array) -> Array:
 def without_negative(flexibility: Array) -> Array:
     """(S, R, R) the nearest flexibilities that resist every motion: modes of few elements carry more between nodes
     than there is."""
-    own, vectors = np.linalg.eigh(flexibility)
-    return np.asarray(vectors * np.maximum(own, 0.0)[:, None] @ np.swapaxes(vectors, 1, 2))
+    wrong = _with_negative(flexibility)
+    if not wrong.any():
+        return flexibility
+    own, vectors = np.linalg.eigh(flexibility[wrong])
+    found = flexibility.copy()
+    found[wrong] = vectors * np.maximum(own, 0.0)[:, None] @ np.swapaxes(vectors, 1, 2)
+    return found
+
+
+def _with_negative(flexibility: Array) -> Mask:
+    """(S,) which of symmetric matrices (S, R, R) have a negative eigenvalue: by the pivots of L D L^T, as many as there
+    are (Sylvester), but for rounding."""
+    left, found = flexibility.copy(), np.zeros(len(flexibility), dtype=np.bool_)
+    least = ROUNDED * np.abs(flexibility).max(axis=(1, 2), initial=0.0)
+    for k in range(flexibility.shape[1]):
+        pivot, column = left[:, k, k].copy(), left[:, k + 1 :, k].copy()
+        felt = pivot > least
+        found |= (pivot < -least) | (~felt & (np.abs(column).max(axis=1, initial=0.0) > least))
+        shares = column / np.where(felt, pivot, np.inf)[:, None]
+        left[:, k + 1 :, k + 1 :] -= shares[:, :, None] * column[:, None, :]
+    return found
 
 
 def residual(model: SceneModel, along: Along, ties: Counts) -> Array:

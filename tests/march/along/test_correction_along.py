@@ -9,6 +9,7 @@ import pytest
 
 import engine
 from engine.bodies.modal.modal_body import Direction, ModalBody
+from engine.model.attachment import without_negative
 from engine.model.distinct_models import base_scene
 from engine.model.station_path import frozen
 from engine.scene.study import Study
@@ -131,6 +132,25 @@ class Twin:
             rows = np.stack([self.modal.gauges["sway"].row, self.modal.shape([1.45])[0]])
             found.append(rows @ u[: len(self.soft)] + self.missed(phase.s(now)) @ forces)
         return np.array(found).T
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 6])
+def test_what_modes_carry_too_much_of_is_taken_off_alone(size: int) -> None:
+    """As by all eigenvalues, of matrices that resist, do not, are of rank one, or nothing; what resists stays."""
+    draw = np.random.default_rng(size)
+    rows = draw.normal(size=(200, size, size))
+    given = rows @ np.swapaxes(rows, 1, 2)
+    given[::7] -= 0.5 * np.eye(size)
+    given[3::11] = 0.0
+    given[5::13] = -np.outer(rows[0, 0], rows[0, 0])
+    given[6::13] = np.outer(rows[0, 0], rows[0, 0])
+    own, vectors = np.linalg.eigh(given)
+    expected = vectors * np.maximum(own, 0.0)[:, None] @ np.swapaxes(vectors, 1, 2)
+    found = without_negative(given)
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-11 * np.abs(given).max())
+    fine = own[:, 0] > 1e-9
+    assert (own[:, 0] < -0.1).sum() > 20 and fine.sum() > 50
+    np.testing.assert_array_equal(found[fine], given[fine])
 
 
 BEDS: dict[str, tuple[dict[str, Any], tuple[Direction, ...]]] = {
