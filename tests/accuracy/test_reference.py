@@ -265,9 +265,9 @@ def test_levels_have_more_and_more_of_the_modes_that_loads_excite() -> None:
 def test_errors_of_what_a_head_beside_the_axis_pushes_are_told() -> None:
     """Of a portal whose head brakes by a lever half of the errors by the first three levels were told too small, up to
     4.6 times, as long as the head did not feel all that few modes miss under it."""
-    sweep = {"acceleration": {"of": "carriage.head.motion.acceleration", "values": [3.0, 5.0, 7.0]}}
+    sweep = {"acceleration": {"of": "carriage.head.motion.acceleration", "values": [2.0, 3.0, 5.0, 7.0]}}
     told, observed = np.zeros(0), np.zeros(0)
-    for wanted in (1e-3, 2e-2):
+    for wanted in (1e-3, 3e-3):
         given = engine.load(catalogue.find_study("machine-tool"))
         plan = make_plan(given.with_values({"sweep": sweep, "solver.tolerance": wanted}))
         found = audit(plan, np.arange(plan.size))
