@@ -313,5 +313,5 @@ def _sensors(scene: Layout) -> Table:
         else:
             place = study.body[str(sensor.body)].spot_place(spot)
             where = f"{spot.key} {getattr(spot, spot.key):}" + ("" if place is None else f" at {_place(place)}")
-        rows.append((name, sensor.words, study.body_of(name), where))
+        rows.append((name, sensor.words, study.body_of(name), f"{where}{sensor.way_in_words}"))
     return Table("Sensors", ("sensor", "quantity", "body", "where"), rows)

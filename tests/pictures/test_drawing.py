@@ -67,7 +67,7 @@ def test_every_study_is_drawn(name: str, tmp_path: Path) -> None:
         rest = shown.partition(f"Mode shapes of {part.name}")[2]
         for mode, omega in enumerate(part.modal.omega[:FREQUENCIES_SHOWN], start=1):
             assert f"mode {mode}: {number(omega / (2.0 * np.pi))} Hz" in rest
-    for word in (*found.carriage, *found.sensor, found.title):
+    for word in (*found.carriage, *found.sensor, found.title, *(one.way_in_words for one in found.sensor.values())):
         assert word in shown
     modes = sum(part.modal.omega.size for part in base_scene(found).bodies)
     assert text.count("<animate ") >= min(2, modes)
