@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from itertools import product
 from math import prod
+from typing import NamedTuple
 
 import numpy as np
 
@@ -49,6 +50,29 @@ def settling_of(results: Results, name: str) -> Array:
     return np.where(results.with_values, values, np.nan)
 
 
+class Times(NamedTuple):
+    """Times of move and settling and their errors, in the sweep's shape; NaN where something has not settled."""
+
+    values: Array
+    errors: Array
+
+    @classmethod
+    def until_all(cls, results: Results, sensors: Sequence[str]) -> "Times":
+        """Until the last of some sensors has settled."""
+        names = [names_of_times(sensor)[1] for sensor in sensors]
+        values = np.stack([settling_of(results, name) for name in names])
+        errors = np.stack([absolute_errors(results, name) for name in names])
+        last = np.argmax(values, axis=0)[None]
+        return cls(values.max(axis=0), np.take_along_axis(errors, last, axis=0)[0])
+
+
+def settle_together(results: Results) -> list[str]:
+    """Sensors with a time of move and settling, where motions differ in these; none where that is one's alone."""
+    banded = [name for name in results.sensors if results.study.sensor[name].settling_band is not None]
+    found = [name for name in banded if moves_differ(results, name)]
+    return found if len(found) > 1 else []
+
+
 def moves_differ(results: Results, sensor: str) -> bool:
     """Whether variants come to rest at different times, so that the shortest settling is not the shortest time."""
     settling, whole = (settling_of(results, name) for name in names_of_times(sensor))
@@ -87,6 +111,8 @@ def residuals(results: Results, asked: AskedOfRest) -> list[str]:
         doubt = absolute_errors(results, f"{sensors[0]}_residual")
         effects = told_effects(results, residual_of(results, sensors[0]), "the largest such swing", doubt)
         said[0] += f" {effects}" if effects else ""
+    if together := settle_together(results):
+        said.insert(1, f"Until all of {listed(together)} have settled, {_shortest(results, together)}.")
     return said
 
 
@@ -159,8 +185,8 @@ def _settled(results: Results, sensor: str, asked: AskedOfRest, axis: Axis | Non
     if asked.settling_time is not None:
         longer = where_beyond(results, np.where(np.isnan(values), np.inf, values), asked.settling_time, axis)
         said.append(f"it takes longer than {quantity(asked.settling_time, 's')} {longer}")
-    if moves_differ(results, sensor):
-        said.append(_shortest(results, sensor))
+    if moves_differ(results, sensor) and not settle_together(results):
+        said.append(_shortest(results, [sensor]))
     if left:
         said.append(_not_settled(results, results.with_values & np.isnan(values), axis))
     return "".join(f"; {one}" for one in said)
@@ -174,13 +200,15 @@ def _not_settled(results: Results, left: Mask, axis: Axis | None) -> str:
     return f"{have} not settled by the end of the run{where}: a longer rest tells when"
 
 
-def _shortest(results: Results, sensor: str) -> str:
-    """The shortest time of move and settling: for each of a few values of what is none of the motion's to choose, such
-    as the mass or the way, that first which changes it most, at the worst of what else does."""
-    values = settling_of(results, names_of_times(sensor)[1])
+def _shortest(results: Results, sensors: Sequence[str]) -> str:
+    """The shortest time of move and settling until the last of some sensors has settled: for each of a few values of
+    what is none of the motion's to choose, such as the mass or the way, that first which changes it most, at the worst
+    of what else does."""
+    times = Times.until_all(results, sensors)
+    values = times.values
     given = [axis for axis in results.axes if axis.values.size > 1 and (axis.sets(DIRECTION) or not axis.sets_motion)]
     if VARIANT in results.dims or not given:
-        return f"move and settling take {_least(results, sensor, values, ' at least')}"
+        return f"move and settling take {_least(results, times, ' at least')}"
     change = {axis: _changes_best(results, values, given, axis) for axis in given}
     felt = sorted((axis for axis in given if change[axis] > ALIKE), key=lambda axis: -change[axis])
     each = felt[: max(1, sum(prod(a.values.size for a in felt[: n + 1]) <= MOST_BEST for n in range(len(felt))))]
@@ -191,7 +219,7 @@ def _shortest(results: Results, sensor: str) -> str:
         pairs = list(zip(each, own, strict=True))
         here = [results.everywhere(results.dataset[axis.name]) == value for axis, value in pairs]
         among = np.where(np.all(here, axis=0), values, np.nan) if here else values
-        least = _least(results, sensor, among, known=given) if np.isfinite(among).any() else ""
+        least = _least(results, times._replace(values=among), known=given) if np.isfinite(among).any() else ""
         rows.setdefault(least, []).append(", ".join(f"{axis.noun} {axis.in_words(value)}" for axis, value in pairs))
     never = listed(rows.pop("", []))
     found = [f"{least} ({listed(where)})" if where[0] else least for least, where in rows.items()]
@@ -211,11 +239,11 @@ def _changes_best(results: Results, values: Array, given: Sequence[Axis], axis: 
     return float(np.divide(high, low, out=np.ones_like(low), where=np.isfinite(low)).max() - 1.0)
 
 
-def _least(results: Results, sensor: str, values: Array, words: str = "", known: Sequence[Axis] = ()) -> str:
+def _least(results: Results, times: Times, words: str = "", known: Sequence[Axis] = ()) -> str:
     """The smallest of times with its error, words, and where in the sweep it is, of which some numbers are known."""
-    place = extreme(-values)
+    place = extreme(-times.values)
     assert place is not None
-    took, error = float(values[place]), float(absolute_errors(results, names_of_times(sensor)[1])[place])
+    took, error = float(times.values[place]), float(times.errors[place])
     names = {axis.name for axis in known}
     axes = [axis for axis in results.axes if axis.values.size > 1 and axis.name not in names]
     where = f" at {', '.join(axis.at(place[results.dims.index(axis.dim)]) for axis in axes)}" if axes else ""

@@ -87,3 +87,21 @@ def test_the_best_motion_is_told_for_each_mass_and_way_at_the_worst_damping() ->
     found["midspan_move_and_settle_time"] = times.copy(data=known)
     (said,) = (text for text in answers.answer(found) if "at rest" in text)
     assert ", whatever push, way and zeta" in said and "(push" not in said.partition("whatever")[0]
+
+
+def test_of_several_sensors_the_time_is_told_until_all_have_settled() -> None:
+    """That of the last one in each variant, with its error; one that has not settled settles nothing."""
+    sensors = {name: {"body": "bed", "at": at, "settling_band": 8e-3} for name, at in (("middle", 0.5), ("near", 0.3))}
+    found = studies.run(stops(sweep=SWEPT, sensor=sensors, output={"residual": True, "histories": "none"}))
+    names = [f"{sensor}_move_and_settle_time" for sensor in sensors]
+    for name, known in zip(names, ([5.0, 3.0, 1.0, 2.0, 6.0], [1.0, 4.0, np.nan, 5.0, 7.0]), strict=True):
+        found[name] = found[name].copy(data=np.array(known))
+        found[name.replace("move_and_settle", "settling")] = found[name].copy(data=0.5 * np.array(known))
+    for name, error in zip(names, (0.5, 0.01), strict=True):
+        found["estimated_error"].loc[{"result": name}] = error
+    told = [text for text in answers.answer(found) if "have settled" in text]
+    assert len(told) == 1 and told[0].startswith(
+        "Until all of middle and near have settled, move and settling take 4 s"
+    )
+    assert told[0].endswith(f"at least at acceleration {STEPS[1]} m/s².") and "± 2 s" not in told[0]
+    assert not any("; move and settling" in text for text in answers.answer(found))
