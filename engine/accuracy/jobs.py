@@ -7,9 +7,12 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Generic, Protocol, TypeVar
 
+import numpy as np
+
 from results_schema.arrays import Counts
 
 T = TypeVar("T")
+NOBODY: Counts = np.zeros(0, dtype=np.int64)
 Halted = Callable[[], bool]
 Told = Callable[[int, int], object]  # how many are done, and of how many
 

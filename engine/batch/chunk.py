@@ -5,17 +5,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from engine.accuracy.grids import SceneGrid
 from engine.accuracy.groups import Found, Group, marches_again
-from engine.accuracy.jobs import Halted, Job, Share
+from engine.accuracy.jobs import NOBODY, Halted, Job, Share
 from engine.accuracy.results import Result, results_of, worst_held
 from engine.accuracy.shown import stations_shown
-from engine.batch.plan import NOBODY, Plan
 from engine.kernels.layout import LANES
 from engine.linear_algebra import one_thread
 from engine.march.outcome import USED, Asked, Flat, Outcome, histories
@@ -28,6 +27,9 @@ from results_schema.gravest_status import gravest, lost
 from results_schema.status import Status
 from results_schema.store.rows import Arrays, Chunk, Rows, joined
 from results_schema.variables import axes, expand
+
+if TYPE_CHECKING:
+    from engine.batch.plan import Plan
 
 #: Jobs of short chunks, at least, and chunks of one: handed over one by one to two processes 600 scenes took 20.8 s in
 #: place of 11.4, as that takes as long as what each computes.

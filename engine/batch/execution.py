@@ -15,9 +15,9 @@ import numpy as np
 
 from engine.accuracy.choice import Kept
 from engine.accuracy.grids import SceneGrid
-from engine.accuracy.jobs import Crashed, Halted, Told, untold
+from engine.accuracy.jobs import NOBODY, Crashed, Halted, Told, untold
 from engine.batch.executors import Place, Shared, Threads, Where, check_chunk, check_options, place, run_jobs
-from engine.batch.plan import EVERY_MARCH, NOBODY, Plan, check_memory, make_plan
+from engine.batch.plan import EVERY_MARCH, Plan, check_memory, make_plan
 from engine.linear_algebra import one_thread
 from engine.march.march import March, prepare
 from engine.march.richardson import march_pair, march_scheme

@@ -16,7 +16,7 @@ import numpy as np
 from engine.accuracy.choice import PILOTS, Choice, Kept, Pilots, choose, find, pilots_of, tolerance_span
 from engine.accuracy.grids import KEPT_CYCLE, SceneGrid, unit_steps
 from engine.accuracy.groups import ConvergingGroup, Group, on_rungs
-from engine.accuracy.jobs import Share, Told, untold
+from engine.accuracy.jobs import NOBODY, Share, Told, untold
 from engine.accuracy.ladder import share_ladder
 from engine.accuracy.reference import USUAL_LEVEL, in_full, level_work
 from engine.accuracy.results import results_of
@@ -71,7 +71,6 @@ FEW_CONVERGING, FEW_CLIMBING = 24, 3
 #: Variants of which processes get the choice, each for itself: of 1e6 in 8 scenes threads take 10.9 s and two processes
 #: 8.5; of 4e6 in 4 scenes 31 s and 890 MiB, and 34 s and 2.3 GiB.
 MOST_SENT = 2**20
-NOBODY: Counts = np.zeros(0, dtype=np.int64)
 
 
 def _whole(plan: Plan, chunk: Chunk) -> Chunk:

@@ -11,11 +11,11 @@ import numpy as np
 
 from engine.accuracy.choice import PILOTS, pilots_of, scenes_of_pilots, usual_pilots
 from engine.accuracy.groups import ConvergingGroup, Group
-from engine.accuracy.jobs import Job
+from engine.accuracy.jobs import NOBODY, Job
 from engine.batch.audit import audit_seconds, audited
 from engine.batch.execution import warm_up
 from engine.batch.executors import Place, Shared, in_processes, place
-from engine.batch.plan import NOBODY, Plan
+from engine.batch.plan import Plan
 from engine.kernels.compiling import clock_without_compiling
 from engine.linear_algebra import one_thread
 from engine.march.stepper import Halted
