@@ -35,7 +35,7 @@ AUDIT = 1.7  # times the convergence of some variants that an audit takes, one l
 UNFINISHED = 2.0  # times the seconds in which variants did not converge that they take
 AROUND = 1.6  # times loading and planning: gathering and writing take about half as much
 LONGER = 2.5  # times a round that the next one takes: four times the pilots by the same tables
-TOGETHER = 2  # variants of a scene that converge together
+TOGETHER = 32  # variants of a scene that converge together
 TIMED = 1024  # variants by which the pace of the march is measured
 
 
@@ -137,11 +137,12 @@ def _converged(plan: Plan, lanes: Counts, halted: Callable[[], bool], scene: int
 def _of_convergence(plan: Plan, looked: Looked, threads: int) -> Forecast:
     """A study whose variants all converge by themselves, each chunk with tables of its own."""
     chunks = sum(1 for _ in plan.chunks(None, None))
-    seconds = looked.start + looked.seconds * chunks + plan.seconds / min(threads, chunks)
+    at_once, in_turns = looked.seconds * threads, -(-chunks // threads)
+    seconds = looked.start + at_once * in_turns + plan.seconds / min(threads, chunks)
     if not looked.parts:
         less = f"{PATIENCE:.0f} seconds were not enough for a variant to converge: this may take longer"
         return Forecast(plan, "", (), seconds, less)
-    seconds += AUDIT * looked.seconds * min(len(plan.grids), audited(plan))
+    seconds += AUDIT * at_once * -(-min(len(plan.grids), audited(plan)) // threads)
     title = f"What {counted(len(looked.parts), 'variant')} converged with; in a run every variant does by itself"
     return Forecast(plan, title, chosen.rows(looked.parts), seconds)
 

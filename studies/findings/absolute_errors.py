@@ -17,6 +17,7 @@ from studies.results.results import Results
 
 LOOSE_PART = 0.1  # of a value: an estimated error above stands beside it
 LEAST_PART = 0.1  # of the true value, that what is reported counts as at least: beyond nothing is known
+DYNAMIC_AMPLIFICATION = "dynamic_amplification"
 OF_TOOLS = ("error_moving", "error_working", "error_holding")
 OF_RAILS = ("deflection_largest", "stress_largest")
 
@@ -37,9 +38,11 @@ def errors(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def _unit(results: Results, array: xr.DataArray, sensor: str) -> str:
-    """The unit of a result, or of its sensor."""
+    """The unit of a result, or of its sensor; a ratio has none."""
     own = str(array.attrs.get("units", "") or "1")
-    return own if own != "1" or not sensor else str(results.dataset["sensor_unit"].sel(sensor=sensor).item())
+    if own != "1" or not sensor or array.name == DYNAMIC_AMPLIFICATION:
+        return own
+    return str(results.dataset["sensor_unit"].sel(sensor=sensor).item())
 
 
 def _joined(array: xr.DataArray, parts: list[xr.DataArray]) -> xr.DataArray:

@@ -52,11 +52,18 @@ class Limits(Spec):
         return None if sensor.is_dynamic_part else self.limit(sensor.quantity)
 
 
+class LimitsAtRest(Limits):
+    """The same of residual vibrations, in which a dynamic part swings as the whole does."""
+
+    def of(self, sensor: Sensor) -> float | None:
+        return self.limit(sensor.quantity)
+
+
 class AskedOfRest(Spec):
     """What a table [question] asks of the time after all carriages have come to rest or left. residual: limits of
     residual vibrations, settling_time: of how long sensors take to settle, of which is told where they are exceeded."""
 
-    residual: Limits = Limits()
+    residual: LimitsAtRest = LimitsAtRest()
     settling_time: Annotated[Time, Field(gt=0)] | None = None
 
 

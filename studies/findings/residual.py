@@ -96,10 +96,11 @@ def ringing(results: Results, limits: Limits) -> list[str]:
 
 
 def has_whole(results: Results, name: str) -> bool:
-    """Whether a sensor reads the dynamic part of what another one reads."""
-    known = results.study.sensor
+    """Whether a sensor reads the dynamic part of what another one reads, whose settling is told if its own is."""
+    known, settles = results.study.sensor, results.study.sensor[name].settling_band is not None
     same = [other for other in known if known[other].quantity == known[name].quantity and other != name]
     wholes = [other for other in same if not known[other].is_dynamic_part]
+    wholes = [other for other in wholes if known[other].settling_band is not None or not settles]
     return known[name].is_dynamic_part and results.place(name) in map(results.place, wholes)
 
 

@@ -85,8 +85,8 @@ def test_what_the_study_fixes_is_one_row() -> None:
 
 def test_some_variants_are_told_with_what_they_converged() -> None:
     seen = forecast(planned(beam(modes="auto"), {"speed": SPEEDS}, tolerance=1e-2), 1, 1e9, ())
-    assert seen.title.startswith("What 4 variants converged with") and seen.seconds > 0.0
-    assert sum(int(count) for count in column(list(seen.rows), "variants")) == 4
+    assert seen.title.startswith("What 60 variants converged with") and seen.seconds > 0.0
+    assert sum(int(count) for count in column(list(seen.rows), "variants")) == 60
     assert seen.remark == "" and seen.plan.converges
 
 

@@ -105,3 +105,21 @@ def test_of_several_sensors_the_time_is_told_until_all_have_settled() -> None:
     )
     assert told[0].endswith(f"at least at acceleration {STEPS[1]} m/s².") and "± 2 s" not in told[0]
     assert not any("; move and settling" in text for text in answers.answer(found))
+
+
+@pytest.mark.parametrize("beside", [False, True])
+def test_limits_and_settling_of_a_dynamic_part_are_told(beside: bool) -> None:
+    """At rest it swings as the whole does: its limit of residual vibrations counts, and so does its own time to settle
+    where the whole beside it has none."""
+    sensors = {"part": {"body": "bed", "at": 0.5, "settling_band": 8e-3, "part": "dynamic"}}
+    sensors |= {"whole": {"body": "bed", "at": 0.5}} if beside else {}
+    asked = {"residual": {"displacement": 1e-3}}
+    given = stops(sensor=sensors, output={"residual": True, "histories": "none"}, question=asked)
+    (told,) = (text for text in answers.answer(studies.run(given)) if text.startswith("part: at rest"))
+    assert "it exceeds 1 mm" in told and "settled" in told
+
+
+def test_errors_of_an_amplification_have_no_unit() -> None:
+    """As itself."""
+    errors = studies.errors(studies.run(stops(output={"histories": "none"})))
+    assert errors.dynamic_amplification.attrs["units"] == "1" and errors.midspan_max.attrs["units"] == "m"
