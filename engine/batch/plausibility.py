@@ -183,6 +183,14 @@ def _unsupported(plan: Plan) -> Iterator[str]:
             yield f"nothing holds body {part.name} fully: it will move away as a rigid body"
 
 
+def _far_beside(plan: Plan) -> Iterator[str]:
+    for part in plan.base.bodies:
+        lever, length = plan.study.body[part.name].lever, part.modal.length
+        if lever > length:
+            beside = f"the track of body {part.name} lies {lever:.4g} m beside its axis"
+            yield f"{beside}, which is {length:.4g} m long: is the unit of track.offset right?"
+
+
 def _released(plan: Plan) -> Iterator[str]:
     for part in plan.base.bodies:
         if part.own_weight and plan.study.start == "rest":
@@ -353,6 +361,7 @@ REMARKS = (
     lambda plan: doubtful(plan.study, plan.cases),
     lambda plan: half_united(plan.study),
     _unsupported,
+    _far_beside,
     _released,
     _leaves_between,
     _fast,

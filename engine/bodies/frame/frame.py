@@ -230,6 +230,10 @@ class Frame(Body):
         """The direction in which loads act on the track."""
         return self.gravity if self.track.direction is None else self.track.direction
 
+    @property
+    def lever(self) -> float:
+        return float(np.linalg.norm(self.track.offset))
+
     def deflects_down(self, point: str | None = None) -> bool:
         way = self.direction if point is None else self.point[point].direction
         return way is None or bool(np.allclose(unit(way), unit(self.gravity)))

@@ -225,6 +225,11 @@ class Body(SpecOfKind):
         remedy = f"{where} = false{along * (direction == 'along')}"
         raise BadInput(what, where=where, expected=expected, remedy=remedy)
 
+    @property
+    def lever(self) -> float:
+        """How far beside its axis its track lies, m."""
+        return 0.0
+
     def deflects_down(self, point: str | None = None) -> bool:
         """Whether displacements of its track, or of a named point of it, count along gravity."""
         return True
