@@ -101,7 +101,8 @@ def _check_side(study: Study, here: str, body: str, side: Side) -> None:
     """A track moves in a direction beside that of its loads."""
     rides = any(carriage.riding_body == body for carriage in study.carriage.values())
     if rides or not study.body[body].moves(side):
-        what = f"body {body} rides itself" if rides else f"body {body} does not move {side} its own track"
+        why = "rides too, and is not read" if rides else "does not move"
+        what = f"body {body} {why} {side} its own track"
         expected = "a frame, or a body out of finite-element files" + " in space" * (side == "across")
         raise study.source.fault(here, what, expected=expected, remedy="no direction: along gravity")
 

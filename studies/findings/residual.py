@@ -69,7 +69,7 @@ class Times(NamedTuple):
 def settle_together(results: Results) -> list[str]:
     """Sensors with a time of move and settling, where motions differ in these; none where that is one's alone."""
     banded = [name for name in results.sensors if results.study.sensor[name].settling_band is not None]
-    found = [name for name in banded if moves_differ(results, name)]
+    found = [name for name in banded if moves_differ(results, name) and not has_whole(results, name)]
     return found if len(found) > 1 else []
 
 

@@ -119,6 +119,15 @@ def test_limits_and_settling_of_a_dynamic_part_are_told(beside: bool) -> None:
     assert "it exceeds 1 mm" in told and "settled" in told
 
 
+def test_a_dynamic_part_and_its_whole_settle_as_one() -> None:
+    """Both have a band, and one of them tells the time."""
+    place = {"body": "bed", "at": 0.5, "settling_band": 0.025}
+    sensors = {"part": place | {"part": "dynamic"}, "whole": place}
+    told = answers.answer(studies.run(stops(sensor=sensors, output={"residual": True, "histories": "none"})))
+    assert not any("have settled" in text for text in told)
+    assert sum("move and settling take" in text for text in told) == 1
+
+
 def test_errors_of_an_amplification_have_no_unit() -> None:
     """As itself."""
     errors = studies.errors(studies.run(stops(output={"histories": "none"})))
