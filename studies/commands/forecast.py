@@ -41,7 +41,7 @@ TIMED = 1024  # variants by which the pace of the march is measured
 
 class Forecast(NamedTuple):
     """plan: with its choice, where there was time for it. title, rows: the table of what variants are computed with.
-    seconds: expected. remark: what could not be measured, or ""."""
+    seconds: expected. remark: what could not be measured or held, or ""."""
 
     plan: Plan
     title: str
@@ -131,7 +131,8 @@ def _samples(plan: Plan, count: int) -> list[Job[list[chosen.Part]]]:
 def _converged(plan: Plan, lanes: Counts, halted: Callable[[], bool], scene: int) -> list[chosen.Part]:
     """What some variants of a scene converge with."""
     group = ConvergingGroup(plan.grids[scene], plan.members[scene])
-    return list(chosen.converged(plan, group.found(plan.values(group, lanes), lanes, None, halted)))
+    values = plan.values(group, lanes)
+    return list(chosen.converged(plan, group.found(values, lanes, None, halted), values.tighter))
 
 
 def _of_convergence(plan: Plan, looked: Looked, threads: int) -> Forecast:
@@ -144,7 +145,11 @@ def _of_convergence(plan: Plan, looked: Looked, threads: int) -> Forecast:
         return Forecast(plan, "", (), seconds, less)
     seconds += AUDIT * at_once * -(-min(len(plan.grids), audited(plan)) // threads)
     title = f"What {counted(len(looked.parts), 'variant')} converged with; in a run every variant does by itself"
-    return Forecast(plan, title, chosen.rows(looked.parts), seconds)
+    return _told(plan, title, looked.parts, seconds)
+
+
+def _told(plan: Plan, title: str, parts: Sequence[chosen.Part], seconds: float) -> Forecast:
+    return Forecast(plan, title, chosen.rows(plan, parts), seconds, chosen.told_missed(plan, parts))
 
 
 def _without_pilots(plan: Plan, tried: float) -> Forecast:
@@ -212,7 +217,7 @@ def _of_pilots(found: _Round, threads: int, start: float, clock: Callable[[], fl
     again = max(0.0, drawn / measured - more_scenes / scenes) * marched
     pilots = found.took * more_scenes / scenes + again / threads
     march += audit_seconds(plan) * pace
-    return Forecast(plan, title, chosen.rows(chosen.chosen(plan)), start + pilots + march / threads)
+    return _told(plan, title, chosen.chosen(plan), start + pilots + march / threads)
 
 
 def _pace(plan: Plan, group: Group, clock: Callable[[], float]) -> tuple[float, float]:

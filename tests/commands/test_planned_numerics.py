@@ -1,22 +1,26 @@
 """The table of `check` that tells what variants are computed with, and what some seconds of measuring forecast."""
 
 import math
+import re
 import time
 from typing import Any
 
+import numpy as np
 import pytest
 
+from engine.accuracy.groups import Found
 from engine.accuracy.jobs import InTurn
+from engine.accuracy.results import results_of
 from engine.batch.audit import audit_seconds, audited
 from engine.batch.plan import Plan, make_plan
 from engine.scene.study import Study
 from studies.commands import forecast as forecasting
 from studies.commands.forecast import forecast
-from studies.commands.planned_numerics import HEADINGS, chosen, rows
+from studies.commands.planned_numerics import HEADINGS, chosen, converged, rows, told_missed
 from studies.commands.preview import preview
 from studies.protocol.study import kind_of
 from studies.results.formatting import quantity
-from tests.engine.build import beam, cruise, mass, oscillator, study
+from tests.engine.build import beam, cruise, force, mass, oscillator, study
 
 SPEEDS = {"of": "carriage.car.motion.speed", "from": 1e-3, "to": 1.0, "count": 60, "spacing": "log"}
 MASSES = {"of": "carriage.car.mass", "from": 0.01, "to": 0.1, "count": 6}
@@ -68,7 +72,7 @@ def column(table: list[tuple[str, ...]], name: str) -> list[str]:
 
 
 def test_every_variant_is_in_one_row_of_its_model_modes_and_scheme(plan: Plan) -> None:
-    table = rows(chosen(plan))
+    table = rows(plan, chosen(plan))
     assert sum(int(count.replace(",", "")) for count in column(table, "variants")) == 360
     kinds = set(zip(*(column(table, name) for name in ("model", "modes", "scheme")), strict=True))
     assert len(kinds) == len(table) > 2
@@ -79,8 +83,50 @@ def test_every_variant_is_in_one_row_of_its_model_modes_and_scheme(plan: Plan) -
 def test_what_the_study_fixes_is_one_row() -> None:
     found = planned(beam(modes=5), {"speed": SPEEDS, "mass": MASSES}, steps=1200, fidelity="mass")
     found.choose(InTurn(), 16)
-    (row,) = rows(chosen(found))
+    (row,) = rows(found, chosen(found))
     assert row[COLUMN["modes"]] == "5" and row[COLUMN["steps"]] == "1,200"
+
+
+def test_errors_are_told_beside_the_tolerance_of_the_same_result() -> None:
+    """The largest error was told beside that over its tolerance of another result: 2.4e-2 beside 12 of 1e-3."""
+    swept = {"speed": {"of": SPEEDS["of"], "from": 0.1, "to": 1.0, "count": 20}}
+    sensors = {
+        "tight": {"body": "bed", "at": 0.5, "tolerance": 1e-3},
+        "loose": {"body": "bed", "at": 0.3, "quantity": "acceleration", "tolerance": 0.5},
+    }
+    found = make_plan(study(beam(), mass(0.1, cruise(0.0, 1.0, 0.1)), sensor=sensors, sweep=swept))
+    names = [result.name for result in results_of(found.asked)]
+    error = np.zeros((len(names), 2))
+    error[names.index("tight_max")], error[names.index("loose_max")] = (1e-4, 5e-3), (2e-2, 1e-2)
+    told = {"fidelity_used": 3, "modes_used": 4, "scheme_used": 0, "steps_used": 100}
+    used = {name: np.full(2, value) for name, value in told.items()}
+    known = Found(None, used, error, np.array([0.1, 5.0]))  # type: ignore[arg-type]
+    parts = list(converged(found, known, np.array([1.0, 1.0])))
+    assert rows(found, parts[:1]) == [("1", "moving mass", "4", "average-acceleration", "100", "1e-4", "1e-3")]
+    assert rows(found, parts)[0][-2:] == ("5e-3", "1e-3")
+    assert told_missed(found, parts[:1]) == "" and "5e-3 where 1e-3 is asked, for tight_max" in told_missed(
+        found, parts
+    )
+    unknown = [part._replace(error=np.full_like(part.error, np.nan)) for part in parts]
+    assert rows(found, unknown)[0][-2:] == ("unknown", "") and told_missed(found, unknown) == ""
+
+
+def test_tolerances_that_nothing_holds_are_remarked() -> None:
+    """An acceleration under a force that comes at an instant, to which every mode adds; where it is told nothing is
+    missed."""
+    moving = force(1.0, cruise(0.3, 1.0, 0.1))
+    sensor = {"body": "bed", "at": 0.5, "quantity": "acceleration", "tolerance": 1e-4}
+    for own, words in (
+        (1e-4, "(?s)2 of 2 variants looked at would miss .* 1e-4 is asked.*on sensor mid"),
+        ("told", ""),
+    ):
+        sweep = {"speed": {"of": SPEEDS["of"], "values": [0.3, 0.6]}}
+        found = study(
+            beam(modes="auto", damping_ratio=0.02), moving, sensor={"mid": sensor | {"tolerance": own}}, sweep=sweep
+        )
+        seen = forecast(make_plan(found), 1, 1e9, ())
+        assert re.search(words, seen.remark) and bool(seen.remark) == bool(words)
+        assert [row[COLUMN["asked"]] for row in seen.rows] == (["1e-4"] if words else ["nothing"])
 
 
 def test_some_variants_are_told_with_what_they_converged() -> None:
