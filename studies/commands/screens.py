@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from studies.commands.bench import Throughput
     from studies.commands.catalogue import Entry
     from studies.commands.preview import Preview
+    from studies.protocol.parts import TextTable
     from studies.reporting.comparison import Comparison, Difference
     from studies.reporting.summary import Range
     from studies.runs.runner import Outcome
@@ -120,14 +121,16 @@ def show_everything(summary: Summary) -> None:
 def show_outcome(outcome: Outcome) -> None:
     """The answer of a run in sentences, the results that were asked for, their accuracy, and what to do next."""
     from studies.reporting import summary
+    from studies.reporting.side_by_side import side_by_side
 
     results = Results.of(outcome.results)
     heading(outcome.results.attrs["title"])
     said, left = answer_of(results), left_out_of_answer(results)
     paragraphs(*said, *([f"{counted(left, 'more sentence')}: run -v, or the report."] if left else []))
     if not summary.is_measured(outcome.results):  # the grid of those that measure is of methods: its ends say nothing
-        show_ranges(summary.in_tables(results), results.percentiles, summary.every(results))
-        _percentiles(results, [_name(one) for one in summary.in_tables(results)][:MOST_ROWS])
+        found = summary.in_tables(results)
+        show_ranges(found, results.percentiles, summary.every(results), side_by_side(results, found))
+        _percentiles(results, [_name(one) for one in found][:MOST_ROWS])
     _show_accuracy(outcome, results)
 
 
@@ -161,10 +164,13 @@ def show_details(outcome: Outcome) -> None:
     _show_accuracy(outcome, results, *told_choices(results), *told_audit(outcome.audit, results))
 
 
-def show_ranges(found: Sequence[Range], percentiles: Sequence[float], every: str) -> None:
-    """Each result with its range, and where the end is that tells most; in a sentence those that do not change.
+def show_ranges(
+    found: Sequence[Range], percentiles: Sequence[float], every: str, beside: TextTable | None = None
+) -> None:
+    """Each result with its range, and where the end is that tells most, or for a few values of a swept number side by
+    side; in a sentence those that do not change.
 
-    every: those over which they do not, in words.
+    every: those over which they do not, in words. beside: the table with these side by side, where there is one.
     """
     blank()
     if not any(one.extreme.words for one in found):
@@ -180,7 +186,9 @@ def show_ranges(found: Sequence[Range], percentiles: Sequence[float], every: str
         for one in found
         if not one.is_constant
     ]
-    if rows:
+    if beside and not parts:
+        table(beside.title, beside.headings, beside.rows[:MOST_ROWS], tallest=TALLEST)
+    elif rows:
         table("", ("result", "smallest", *parts, "largest", ""), rows[:MOST_ROWS], tallest=TALLEST)
     if rows[MOST_ROWS:]:
         paragraphs(f"{counted(len(rows) - MOST_ROWS, 'more result')}: run -v, or the report.")

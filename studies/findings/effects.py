@@ -15,9 +15,7 @@ from studies.results.results import Results
 
 MOST_AXES = 4  # whose spans are told in one breath
 MOST_EFFECTS = 6  # swept numbers, of which it is told what each does
-MOST_EACH = 4  # values of a swept number for each of which the largest is told
 HARDLY = 0.005  # of the smallest value: what no figure shows
-LEAST_APART = 0.01  # of the larger of two ways, which differ by more
 TIMES = 1.5  # the largest over the smallest from which on it is told how many times, else by how many percent
 HALVED = 2.0  # the same of what falls
 
@@ -75,41 +73,15 @@ def told_effects(results: Results, values: Array, what: str, error: Array | floa
     return f"Over all else that is swept, {what} {listed(told)}." if told else ""
 
 
-def told_for_each(results: Results, values: Array, units: str) -> str:
-    """Of values over two swept numbers the largest for each of the few values of one, and where in the other it is: a
-    sentence behind another; "" elsewhere, and where one is the same for all."""
-    axes = sorted((axis for axis in results.axes if len(axis.values) > 1), key=lambda axis: len(axis.values))
-    if VARIANT in results.dims or len(axes) != 2 or not len(axes[0].values) <= MOST_EACH < len(axes[1].values):
-        return ""
-    few, other = axes
-    if few.sets(DIRECTION):
-        return ""  # `told_both_ways` tells it
-    known = np.where(results.with_values & np.isfinite(values), values, -np.inf)
-    lines = np.moveaxis(known, results.dims.index(few.dim), 0)
-    told = [
-        f"{quantity(float(line.max()), units)} at {other.in_words(float(other.values[np.argmax(line)]))} "
-        f"({few.in_words(float(value))})"
-        for value, line in sorted(zip(few.values, lines, strict=True), key=lambda pair: pair[0])
-        if np.isfinite(line.max())
-    ]
-    tops = {part.partition(" at ")[0] for part in told}
-    return f" For each {few.noun} it is largest with {listed(told)}." if len(tops) > 1 else ""
-
-
 class BothWays(NamedTuple):
-    """Values forward and backward where they differ most, and where that is; part: by how much of the larger one, and
-    whether that is more than their errors anywhere."""
+    """Values forward and backward where they differ most beyond their errors, and where that is; part: by how much of
+    the larger one, and whether that is more than their errors."""
 
     forward: float
     backward: float
     at: str
     part: float
     beyond_errors: bool
-
-    @property
-    def differs(self) -> bool:
-        """By more than is of any interest, and than is doubtful."""
-        return self.beyond_errors and self.part > LEAST_APART
 
     def words(self, units: str) -> str:
         """Both values, and where."""
@@ -129,12 +101,12 @@ def both_ways(results: Results, values: Array, error: Array | float = 0.0) -> Bo
     apart = np.abs(pairs[0] - pairs[1])
     if not np.isfinite(apart).any():
         return None
-    flat = int(np.nanargmax(apart))
+    flat = int(np.nanargmax(apart - doubts.sum(axis=0)))
     worst = dict(zip(rest, map(int, np.unravel_index(flat, apart.shape)), strict=True))
     others = [other for other in results.axes if other is not axis and other.values.size > 1]
     forward, backward = pairs.reshape(2, -1)[:, flat].tolist()
     part = abs(forward - backward) / max(forward, backward) if forward != backward else 0.0
-    beyond = bool((apart > doubts.sum(axis=0)).any())
+    beyond = bool(apart.flat[flat] > doubts.sum(axis=0).flat[flat])
     return BothWays(forward, backward, ", ".join(other.at(worst[other.dim]) for other in others), part, beyond)
 
 

@@ -32,12 +32,10 @@ from studies.findings.beyond import (
 )
 from studies.findings.contacts import told_contacts, told_uplift
 from studies.findings.effects import (
-    both_ways,
     by_effect,
     hardly_changed,
     told_both_ways,
     told_effects,
-    told_for_each,
     unchanged,
 )
 from studies.findings.envelopes import beyond_sensors, sizes_along, told_along
@@ -100,8 +98,7 @@ class Passage(Kind):
         said = _once(OF_LARGEST, _with_remark(said, told_between_speeds(results)))
         if sensors:  # of which those after the first may be cut
             first = sensors[0]
-            besides = _limited_besides(results, first) + _amplified_besides(results, first)
-            said[len(envelopes)] += besides + _ways_besides(results, first)
+            said[len(envelopes)] += _limited_besides(results, first) + _amplified_besides(results, first)
         said[0] += _effects(results, envelopes, sensors)
         lifted, kept = told_contacts(results)
         residual = residuals(results, question_of(results.study, AskedOfPassages))
@@ -170,7 +167,6 @@ def _largest(results: Results, sensor: str) -> str:
 def _effects(results: Results, envelopes: list[str], sensors: list[str]) -> str:
     """What every swept number does to what the answer begins with, where there are several; "" else."""
     error: Array | float = 0.0
-    each = ""
     if envelopes:
         name = envelopes[0]
         what, values = (
@@ -183,10 +179,9 @@ def _effects(results: Results, envelopes: list[str], sensors: list[str]) -> str:
         error, units = errors_of_size(results, sensors[0]), results.sensors[sensors[0]]
         if hardly_changed(results, values, partial(quantity, units=units)):
             return told_both_ways(results, values, f"the largest {what}", units, error)
-        each = told_for_each(results, values, units)
     said = told_effects(results, values, f"the largest {what}", error)
     ways = told_both_ways(results, values, f"the largest {what}", units, error)
-    return f" {said}{each}{ways}" if said else ways
+    return f" {said}{ways}" if said else ways
 
 
 def _amplified(results: Results, sensor: str) -> str:
@@ -243,18 +238,6 @@ def _limited_besides(results: Results, told: str) -> str:
     words += [f"{len(order) - MOST_TOLD} more"] * (len(order) > MOST_TOLD)
     exceed = "exceeds its limit" if len(order) == 1 else "exceed their limits"
     return f" Of the other sensors {listed(words)} {exceed}."
-
-
-def _ways_besides(results: Results, told: str) -> str:
-    """Of which sensors besides that one the largest value differs most forward and backward."""
-    others = [name for name in results.sensors if name != told and not only_rounding(results, name)]
-    found = {name: both_ways(results, sizes(results, name), errors_of_size(results, name)) for name in others}
-    known = [(name, ways) for name, ways in found.items() if ways is not None and ways.differs]
-    known.sort(key=lambda one: -one[1].part)
-    said = [ways if n == 0 else ways._replace(at="") for n, (_, ways) in enumerate(known[:MOST_TOLD])]
-    words = [f"{name} ({ways.words(results.sensors[name])})" for (name, _), ways in zip(known, said, strict=False)]
-    words += [f"{len(known) - MOST_TOLD} more by less"] * (len(known) > MOST_TOLD)
-    return f" The largest values of other sensors differ forward and backward: {listed(words)}." if words else ""
 
 
 def _once(remark: str, said: list[str]) -> list[str]:

@@ -173,7 +173,7 @@ def _contact(seen: View, carriages: list[str]) -> Figure:
         title = f"{f'The first of {who}' if several else who} would lift off{_from(seen, force)}"
     elif float(np.nanmin(force)) < 0.0:
         title = f"{who} {keeps} {its} contact in this part of the sweep, and would lift off in another"
-    height = 3.4 if seen.y is not None else 2.8
+    height = 3.4 if _in_plane(seen) else 2.8
     name = "contact" if several else f"contact-{who}"
     return draw(name, title, caption, height, partial(_draw_contact, seen, carriages))
 
@@ -207,11 +207,21 @@ def _relative_force(seen: View, carriage: str) -> Any:
 
 
 def _has_line(seen: View, force: Any) -> bool:
-    """Whether a map of the force has a line of zero: on a grid, where both signs occur."""
+    """Whether a map of the force has a line of zero: where both signs occur."""
     grid = seen.plane(force)
     known = grid[np.isfinite(grid)]
-    on_grid = seen.y is not None and not seen.is_sampled and min(grid.shape) >= 2
-    return bool(on_grid and known.size and known.min() < 0.0 < known.max())
+    return bool(
+        _in_plane(seen)
+        and not seen.is_sampled
+        and min(grid.shape) >= 2
+        and known.size
+        and known.min() < 0.0 < known.max()
+    )
+
+
+def _in_plane(seen: View) -> bool:
+    """Whether a force is drawn in colours over two axes: of samples, and of more values than curves show."""
+    return seen.y is not None and (seen.is_sampled or len(seen.y.values) > MANY)
 
 
 def _draw_contact(seen: View, carriages: list[str], drawing: Drawing) -> None:
@@ -221,9 +231,9 @@ def _draw_contact(seen: View, carriages: list[str], drawing: Drawing) -> None:
         each = [(name, seen.curves(_relative_force(seen, name))) for name in carriages]
         draw_curves(axes, seen, [curve._replace(label=name) for name, (curve,) in each])
         legend_beside(axes, "carriage")
-    elif seen.y is None:
+    elif not _in_plane(seen):
         draw_curves(axes, seen, seen.curves(force))
-    if seen.y is None:
+    if not _in_plane(seen):
         zero_line(axes)
         along_axis(axes, seen)
         axes.set_ylabel("smallest contact force / weight")
@@ -231,7 +241,8 @@ def _draw_contact(seen: View, carriages: list[str], drawing: Drawing) -> None:
         mesh = draw_map(axes, seen, force, cmap="PuOr", vmin=-1.0, vmax=1.0)
         colour_bar(axes, mesh, "smallest contact force / weight", extend="both")
     speed_ratio(axes, seen)
-    if seen.y is not None and seen.x is not None and _has_line(seen, force):
+    if _has_line(seen, force):
+        assert seen.x is not None and seen.y is not None
         x, y = seen.along(seen.x), seen.along(seen.y)
         axes.contour(x, y, seen.plane(force).T, [0.0], colors=look.VERMILION, linewidths=1.8)
         line = Line2D([], [], color=look.VERMILION, linewidth=1.8)

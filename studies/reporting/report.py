@@ -30,6 +30,7 @@ from studies.pictures.common import estimates, unreduced
 from studies.pictures.common.figures import png, svg
 from studies.protocol.study import kind_named
 from studies.reporting.answers import figures_of, found_of
+from studies.reporting.side_by_side import side_by_side
 from studies.reporting.summary import every, in_tables, noun
 from studies.results.axes import Axis
 from studies.results.formatting import counted, number, unit_text
@@ -163,6 +164,7 @@ def page_of(source: Archive, results: Results, drawn: Sequence[Drawn], of_questi
         scene=_scene(results),
         sweep=_sweep(results),
         results=_results(results),
+        beside=side_by_side(results, in_tables(results)),
         percentiles=[f"{value:g} %" for value in results.percentiles],
         declarations=_declarations(results),
         provenance=_provenance(source),
@@ -383,7 +385,7 @@ def _provenance(source: Archive) -> list[Row]:
         "Conventions": "conventions",
         "schema_version": "schema",
     }
-    found = [Row("archive", source.path.name)]
+    found = [Row("archive", source.path.name)] * source.path.is_file()  # none of a dataset
     for key, words in wanted.items():
         if key in source.root.attrs:
             found.append(Row(words, _attribute(key, source.root.attrs[key])))

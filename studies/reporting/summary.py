@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 SOME_NOT_OK = 3
 ENERGY = "energy_change"  # of frames that move
+MOVE_AND_SETTLE = "_move_and_settle_time"
 MOST_TIED = 3  # variants with the same value of which the first is named
 LEAST_TOLD = 1e-5  # of a value: smaller errors say nothing beside four digits of it
 
@@ -87,9 +88,9 @@ class Range:
 
     @property
     def telling(self) -> Extreme:
-        """The end that is looked for: the smallest of what is smallest over time, such as a contact force, the largest
-        of what is largest, and of others that of larger magnitude."""
-        sides = {"_min": self.smallest, "_max": self.largest}
+        """The end that is looked for: the smallest of what is smallest over time, such as a contact force, and of the
+        time of move and settling, the largest of what is largest, and of others that of larger magnitude."""
+        sides = {"_min": self.smallest, "_max": self.largest, MOVE_AND_SETTLE: self.smallest}
         return next((end for ending, end in sides.items() if self.name.endswith(ending)), self.extreme)
 
     @property
@@ -284,7 +285,7 @@ def _range(study_results: Results, name: str, sensor: str, array: xr.DataArray) 
     percentiles = np.nanpercentile(values, study_results.study.output.percentiles)
     stem = name.removesuffix("_max").removesuffix("_min")
     both = [results[f"{stem}_{end}"].values for end in ("max", "min") if f"{stem}_{end}" in results]
-    beside = max((float(np.nanmax(np.abs(one))) for one in both), default=0.0)
+    beside = max((float(np.nanmax(np.abs(one), initial=0.0)) for one in both), default=0.0)
     beside = max(beside, _largest_alike(study_results, stem.removesuffix("_residual").removesuffix("_rms")))
     yield Range(name, sensor, units, smallest, largest, tuple(map(float, percentiles)), beside, having)
 

@@ -151,7 +151,9 @@ def _fewer(verdict: Verdict, results: Results) -> list[str]:
     asked, drawn, told = results.study.solver.audit, verdict.count + verdict.marked + verdict.left_out, list[str]()
     if verdict.left_out:
         more = counted(verdict.left_out, "further variant")
-        told.append(f"{more} picked for the audit could not be compared: without values, or nothing finer is left")
+        lost = any(not status.values_kept for status in results.status_counts)
+        why = "without values, or nothing finer is left" if lost else "nothing finer is left"
+        told.append(f"{more} picked for the audit could not be compared: {why}")
     if asked != "auto" and drawn < asked:
         others = "" if drawn == results.variants else " but for those by which models were chosen for others"
         told.append(f"audit = {asked} asks for more variants than there are{others}")

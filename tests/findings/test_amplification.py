@@ -181,18 +181,6 @@ def test_the_support_that_pulls_most_is_told_with_the_first_of_them() -> None:
     assert f"Of the other supports {most} pulls by up to {quantity(-least[most], 'N')}" in said
 
 
-def test_sensors_that_differ_in_both_directions_are_told_beside_the_first() -> None:
-    """Midspan of a symmetric beam reads the same; what stands beside it does not."""
-    sensors = {"midspan": fixed(0.5), "quarter": fixed(0.25), "end": fixed(0.0, "support_reaction")}
-    way = {"way": {"of": "carriage.car.motion.direction", "values": ["forward", "backward"]}}
-    found = studies.run(built(beam(), force(0.5, cruise(0.0, 1.0, 0.6)), sensor=sensors, sweep=way))
-    told = answers.answer(found)[0]
-    ends = found["end_max"].values
-    assert found.midspan_max[0] == pytest.approx(float(found.midspan_max[1]), rel=1e-3)
-    assert " The largest values of other sensors differ forward and backward: " in told
-    assert f"end ({quantity(float(ends[0]), 'N')} forward, {quantity(float(ends[1]), 'N')} backward)" in told
-
-
 def test_a_remark_stands_once_in_an_answer() -> None:
     sensors = {"midspan": fixed(0.5), "quarter": fixed(0.25), "moment": fixed(0.5, "bending_moment")}
     speeds = {"speed": {"of": "carriage.car.motion.speed", "values": [0.02, 0.03]}}

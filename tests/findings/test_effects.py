@@ -9,7 +9,7 @@ import studies
 from engine.scene.study import Study
 from results_schema.status import Status
 from studies.findings.amplification import sizes
-from studies.findings.effects import told_both_ways, told_effects, told_for_each, unchanged
+from studies.findings.effects import told_both_ways, told_effects, unchanged
 from studies.reporting import answers
 from studies.results.results import Results
 from tests.studies import scenes
@@ -18,24 +18,6 @@ MASS = 'mass = { of = "carriage.table.mass", values = [200, 50, 100] }'
 DEAD = 'place = { of = "sensor.dead.at", values = [1.0, 2.0] }'
 IT = "the largest displacement"
 ELSEWHERE = '[sensor.dead]\nbody = "bed"\nat = 1.0'
-
-
-def test_the_largest_is_told_for_each_value_of_a_number_that_has_few() -> None:
-    """With the value of the other one; at which speed a bridge swings most at each damping took a study of its own."""
-    pace = 'pace = { of = "carriage.table.motion.speed", from = 1, to = 5, count = 5 }'
-    results = Results.of(scenes.run("passage", f"{pace}\n{MASS}"))
-    dims = tuple(axis.name for axis in results.axes)
-    values = np.zeros(results.shape)
-    for mass, (value, speed) in enumerate(((3.0, 4), (1.0, 0), (2.0, 2))):  # as the file lists them: 200, 50, 100
-        values[(speed, mass) if dims[0] == "pace" else (mass, speed)] = value
-    assert told_for_each(results, values, "m") == (
-        " For each mass it is largest with 1 m at 1 m/s (50 kg), 2 m at 3 m/s (100 kg) and 3 m at 5 m/s (200 kg)."
-    )
-    assert told_for_each(results, np.ones(results.shape), "m") == ""
-    assert (
-        answers.answer(results.dataset)[0].endswith(told_for_each(results, sizes(results, "midspan"), "m"))
-        and "For each mass" in answers.answer(results.dataset)[0]
-    )
 
 
 WAY = 'way = { of = "carriage.table.motion.direction", values = ["forward", "backward"] }'

@@ -8,7 +8,7 @@ import pytest
 from studies.pictures.common.figures import Figure
 from studies.pictures.passage import pictures
 from studies.results.results import Results
-from tests.findings.test_answers import FOLLOWER, MASSES
+from tests.findings.test_answers import FOLLOWER
 from tests.studies import scenes
 
 PACE = scenes.pace("passage", 2, 40, 8)
@@ -36,11 +36,12 @@ def test_each_carriage_has_a_curve() -> None:
 
 
 def test_a_map_shows_the_smallest_of_all() -> None:
-    results, (figure,) = contacts(f"{PACE}\n{MASSES}", FOLLOWER)
+    masses = 'mass = { of = "carriage.table.mass", from = 50, to = 400, count = 7 }'
+    results, (figure,) = contacts(f"{PACE}\n{masses}", FOLLOWER)
     assert "Of 2 carriages the smallest." in figure.caption
     assert figure.title.startswith("The first of 2 carriages would lift off from")
     (mesh,) = figure.drawing.axes[0].collections[:1]
-    both = np.fmin(least(results, "table"), np.broadcast_to(least(results, "second"), (8, 2)))
+    both = np.fmin(least(results, "table"), np.broadcast_to(least(results, "second"), (8, 7)))
     assert float(np.nanmin(mesh.get_array())) == pytest.approx(float(np.nanmin(both)))
     assert float(np.nanmax(mesh.get_array())) == pytest.approx(float(np.nanmax(both)))
 

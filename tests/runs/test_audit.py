@@ -161,10 +161,11 @@ def test_variants_without_values_are_left_out_and_counted() -> None:
     less = audit_group(plan, dataset.assign(status=status), Work(1))[GROUP]
     assert int(less["left_out"]) == 1
     xr.testing.assert_identical(less["observed_error"], whole["observed_error"].isel(sample=[0, 2, 3]))
-    told = told_audit(less, Results.of(dataset))
-    assert told[-1] == (
-        "1 further variant picked for the audit could not be compared: without values, or nothing finer is left"
+    told = "1 further variant picked for the audit could not be compared: "
+    assert told_audit(less, Results.of(dataset.assign(status=status)))[-1] == (
+        f"{told}without values, or nothing finer is left"
     )
+    assert told_audit(less, Results.of(dataset))[-1] == f"{told}nothing finer is left"
     assert audit_group(plan, dataset.assign(status=xr.full_like(status, Status.DIVERGED)), Work(1)) == {}
     assert told_audit(None, Results.of(dataset)) == [NONE_OF_THOSE_ASKED.format(4)]
     auto = studies.run(crossing(RICH, {}))
