@@ -107,27 +107,23 @@ def _lifted(results: Results, opened: dict[str, tuple[Mask, Mask]]) -> str:
 
 
 def _kept(results: Results, forces: dict[str, Array]) -> list[str]:
-    """The smallest of contact forces that are all positive, and whether that is certain: of many carriages in one
-    sentence."""
+    """The smallest of contact forces that are all positive, and of which carriages that is not certain."""
     least = {name: float(np.nanmin(force)) for name, force in forces.items()}
     off = {
         name: float(absolute_errors(results, f"{name}_contact_force_min")[extreme(-forces[name])]) for name in forces
     }
     certain = [name for name in forces if not off[name] > least[name]]
     found = [_doubtful(results, name, forces[name], off[name]) for name in forces if name not in certain]
-    if len(certain) > MOST_TOLD:
-        lowest = min(certain, key=lambda name: least[name])
-        return [*found, f"{len(certain)} carriages keep their contact everywhere; {_lowest(results, lowest, forces)}."]
-    return [*found, *(f"{one} keeps its contact everywhere; {_lowest(results, one, forces, '')}." for one in certain)]
-
-
-def _lowest(results: Results, carriage: str, forces: dict[str, Array], of: str | None = None) -> str:
-    """The smallest contact force of a carriage, which is named where no other words stand for it."""
-    force, who = forces[carriage], f", that of {carriage}," if of is None else of
-    place = extreme(-force)
+    if not certain:
+        return found
+    lowest = min(certain, key=lambda name: least[name])
+    who = listed(certain) if len(certain) <= MOST_TOLD else f"{len(certain)} carriages"
+    keeps, of = ("keep their", f", that of {lowest},") if len(certain) > 1 else ("keeps its", "")
+    place = extreme(-forces[lowest])
     assert place is not None
-    loosely = uncertainty(results, f"{carriage}_contact_force_min", place)
-    return f"the smallest contact force{who} is {quantity(float(force[place]), 'N')}{loosely}{in_words(results, place)}"
+    force = f"{quantity(least[lowest], 'N')}{uncertainty(results, f'{lowest}_contact_force_min', place)}"
+    smallest = f"the smallest contact force{of} is {force}{in_words(results, place)}"
+    return [*found, f"{who} {keeps} contact everywhere; {smallest}."]
 
 
 def _doubtful(results: Results, carriage: str, force: Array, off: float) -> str:

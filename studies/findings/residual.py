@@ -248,4 +248,11 @@ def _least(results: Results, times: Times, words: str = "", known: Sequence[Axis
     names = {axis.name for axis in known}
     axes = [axis for axis in results.axes if axis.values.size > 1 and axis.name not in names]
     where = f" at {', '.join(axis.at(place[results.dims.index(axis.dim)]) for axis in axes)}" if axes else ""
-    return f"{quantity(took, 's')}{told_error(error, took, 's')}{words}{where}"
+    ends = [axis.noun for axis in axes if axis.sets_motion and _at_an_end(axis, place[results.dims.index(axis.dim)])]
+    end = f", {'an end' if len(ends) == 1 else 'ends'} of the swept {listed(ends)}" if ends else ""
+    return f"{quantity(took, 's')}{told_error(error, took, 's')}{words}{where}{end}"
+
+
+def _at_an_end(axis: Axis, entry: int) -> bool:
+    """Whether a value is the smallest or largest of more than two, beyond which there may be better ones."""
+    return axis.values.size > 2 and axis.values[entry] in (axis.values.min(), axis.values.max())

@@ -217,10 +217,11 @@ def _end_as_json(end: Extreme) -> dict[str, Any]:
 
 
 def shown(study_results: Results) -> list[Range]:
-    """The ranges that people read: without contact forces of plain forces, which press as they are written."""
+    """The ranges that people read: without contact forces of plain forces, which press as they are written, and
+    amplifications of what statics are no measure of."""
     carriages = study_results.study.carriage.items()
     plain = {f"{name}_contact_force_{end}" for name, one in carriages if not one.inertial for end in ("max", "min")}
-    return [one for one in ranges(study_results) if one.name not in plain]
+    return [one for one in ranges(study_results) if one.name not in plain and not _untold(study_results, one)]
 
 
 def asked(study_results: Results) -> list[Range]:
@@ -245,11 +246,10 @@ def _limited(results: Results) -> list[str]:
 
 
 def in_tables(study_results: Results) -> list[Range]:
-    """The same, but of the axles of a train those alone whose contact forces are the largest and the smallest, of a
-    dynamic part beside its whole no residual vibration, which is the same, and no amplification that answers leave
-    out."""
+    """The same, but of the axles of a train those alone whose contact forces are the largest and the smallest, and of a
+    dynamic part beside its whole no residual vibration, which is the same."""
     alike = {f"{name}_residual" for name in study_results.sensors if has_whole(study_results, name)}
-    found = [one for one in asked(study_results) if one.name not in alike and not _untold(study_results, one)]
+    found = [one for one in asked(study_results) if one.name not in alike]
     for name, train in study_results.study.train.items():
         for end, sign in (("max", 1.0), ("min", -1.0)):
             names = {f"{axle_name(name, axle)}_contact_force_{end}" for axle in range(train.count)}

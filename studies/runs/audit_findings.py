@@ -94,7 +94,8 @@ def _not_held(results: Results) -> str:
     for name, asked in zip(results.dataset["result"].values, results.dataset["tolerance"].values, strict=True):
         if np.isnan(asked) and str(name) in read:  # one after another: there may be very many variants
             largest = float(np.fmax.reduce(results.estimated_error(str(name))[fine], initial=0.0))
-            told += [f"{name} up to {percent(largest)}"] if largest > LARGE else []
+            what = f"the history of {name}" if str(name) in results.sensors else name
+            told += [f"{what} up to {percent(largest)}"] if largest > LARGE else []
     return f"Estimated, but held to no tolerance: {listed(told)}." if told else ""
 
 
