@@ -57,7 +57,8 @@ def test_the_best_motion_is_told_for_each_mass_and_way_at_the_worst_damping() ->
         worst = {step: max(known[step, way, push]) for step in range(5) if np.isfinite(known[step, way, push]).all()}
         step = min(worst, key=lambda one: worst[one])
         where = f"way {('forward', 'backward')[way]}, push {push + 1} N"
-        words.append(f"{worst[step]:.3g} s at acceleration {STEPS[step]} m/s² ({where})")
+        end = ", an end of the swept acceleration" * (step in (0, 4))
+        words.append(f"{worst[step]:.3g} s at acceleration {STEPS[step]} m/s²{end} ({where})")
     assert f"move and settling take at least {listed(words)}, at the worst zeta" in plain
     told = plain.partition("Over all else that is swept, the largest such swing ")[2]
     swing = found.midspan_residual.transpose(*dims).values
