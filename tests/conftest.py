@@ -1,4 +1,5 @@
-"""One thread of linear algebra: its matrices are small here, and idle threads that spin take the processors' time.
+"""What tests run in: one thread of linear algebra, whose matrices are small here, and whose idle threads spin; bytecode
+that is kept, without which every command that a test starts compiles some 200 files again, a second and more each.
 
 And with NO_SKIPS set in the environment a skipped test fails.
 """
@@ -11,6 +12,7 @@ import pytest
 
 for _library in ("OPENBLAS", "OMP", "MKL"):  # before numpy is imported, and for processes that tests start
     os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # as images of containers often set it
 
 
 @pytest.fixture
