@@ -1,5 +1,5 @@
 """What tests run in: one thread of linear algebra, whose matrices are small here, and whose idle threads spin; bytecode
-that is kept, without which every command that a test starts compiles some 200 files again, a second and more each.
+that is kept, without which every command that a test starts compiles some 200 files again, a twentieth of the time.
 
 And with NO_SKIPS set in the environment a skipped test fails.
 """
