@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from studies.reporting.answers import answer, figures
     from studies.reporting.comparison import compare
     from studies.reporting.report import report
+    from studies.reporting.tabulated import export
     from studies.runs.datasets import write
 
 _HOMES = {
@@ -28,6 +29,7 @@ _HOMES = {
     "figures": "studies.reporting.answers",
     "errors": "studies.findings.absolute_errors",
     "compare": "studies.reporting.comparison",
+    "export": "studies.reporting.tabulated",
     "write": "studies.runs.datasets",
     "report": "studies.reporting.report",
     "BadInput": "results_schema.errors",
@@ -40,6 +42,7 @@ __all__ = [
     "answer",
     "compare",
     "errors",
+    "export",
     "figures",
     "kind_named",
     "kind_names",

@@ -123,11 +123,11 @@ class Study(Scene):
         """
         return self._source.text
 
-    def save(self, path: str | Path) -> Path:
+    def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
         """Write that as a file, which the commands read; its path. Raises BadInput where there is something at that
-        place, and OutputFailed."""
+        place, but for a file with ``overwrite``, and OutputFailed."""
         path = Path(path)
-        files.check_new_place(path)
+        (files.check_output_place if overwrite else files.check_new_place)(path)
         files.write_text(path, self.toml())
         return path
 

@@ -130,6 +130,7 @@ def show_outcome(outcome: Outcome) -> None:
     if not summary.is_measured(outcome.results):  # the grid of those that measure is of methods: its ends say nothing
         found = summary.in_tables(results)
         show_ranges(found, results.percentiles, summary.every(results), side_by_side(results, found))
+        paragraphs(*filter(None, [summary.left_out(results)]))
         _percentiles(results, [_name(one) for one in found][:MOST_ROWS])
     _show_accuracy(outcome, results)
 

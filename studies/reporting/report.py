@@ -31,7 +31,7 @@ from studies.pictures.common.figures import png, svg
 from studies.protocol.study import kind_named
 from studies.reporting.answers import figures_of, found_of
 from studies.reporting.side_by_side import side_by_side
-from studies.reporting.summary import every, in_tables, noun
+from studies.reporting.summary import every, in_tables, left_out, noun
 from studies.results.axes import Axis
 from studies.results.formatting import counted, number, unit_text
 from studies.results.results import Results
@@ -160,7 +160,7 @@ def page_of(source: Archive, results: Results, drawn: Sequence[Drawn], of_questi
         more_figures=drawn[open_figures:of_question],
         method_figures=drawn[of_question:],
         statuses=_statuses(results),
-        lost=not all(status.values_kept for status in results.status_counts),
+        left_out=left_out(results),
         scene=_scene(results),
         sweep=_sweep(results),
         results=_results(results),

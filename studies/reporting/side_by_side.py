@@ -8,7 +8,7 @@ import numpy as np
 
 from studies.findings.numerics_used import is_marched
 from studies.protocol.parts import TextTable
-from studies.reporting.summary import MOST_TIED, MOVE_AND_SETTLE, Extreme, Range, in_tables
+from studies.reporting.summary import MOST_TIED, MOVE_AND_SETTLE, Extreme, Range, in_tables, speaking
 from studies.results.axes import DIRECTION, VARIANT, Axis
 from studies.results.cells import single_numbers
 from studies.results.formatting import listed
@@ -25,7 +25,8 @@ def side_by_side(results: Results, found: Sequence[Range]) -> TextTable | None:
     if axis is None or not wanted:
         return None
     order = np.argsort(-axis.values if axis.sets(DIRECTION) else axis.values)
-    columns = [{(one.name, one.sensor): one for one in in_tables(_part(results, axis, n))} for n in order]
+    parts = (_part(speaking(results), axis, n) for n in order)
+    columns = [{(one.name, one.sensor): one for one in in_tables(part)} for part in parts]
     headings = ("result", *(axis.value(n) if axis.sets(DIRECTION) else axis.at(n) for n in order))
     rows = [(" ".join(own).strip(), *(_cell(column.get(own), axis) for column in columns)) for own in wanted]
     return TextTable(_title(results, axis, [name for name, _ in wanted]), headings, rows)

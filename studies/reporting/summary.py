@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 SOME_NOT_OK = 3
 ENERGY = "energy_change"  # of frames that move
+CONTACT_FORCE = "_contact_force_"
 MOVE_AND_SETTLE = "_move_and_settle_time"
 MOST_TIED = 3  # variants with the same value of which the first is named
 LEAST_TOLD = 1e-5  # of a value: smaller errors say nothing beside four digits of it
@@ -173,8 +174,28 @@ def ranges(study_results: Results) -> Iterator[Range]:
             if array.dtype.kind == "f" and name not in beside:
                 yield from _range(study_results, str(name), "", array)
         return
-    for name, sensor, array in single_numbers(results):
+    for name, sensor, array in single_numbers(speaking(study_results).dataset):
         yield from _range(study_results, name, sensor, array)
+
+
+def speaking(results: Results) -> Results:
+    """Results without those of variants whose contact opens, but for contact forces and what tells of the march."""
+    counting = xr.DataArray(results.with_values, dims=results.dims)
+    if (counting == results.kept).all():
+        return results
+    names = {name for name, _, _ in single_numbers(results.dataset) if name not in (ERROR, WORK)}
+    found = {name: results.dataset[name].where(counting) for name in names if CONTACT_FORCE not in name}
+    return replace(results, dataset=results.dataset.assign(found))
+
+
+def left_out(results: Results) -> str:
+    """Which variants ranges leave out, in a sentence; "" where none."""
+    lost = any(not status.values_kept for status in results.status_counts)
+    opened = is_marched(results.dataset) and bool((results.with_values != results.kept.values).any())
+    beside = ", and those whose contact opens of all but contact forces" if opened else ""
+    if lost:
+        return f"{noun(results.dataset).capitalize()}s without values are left out{beside}."
+    return "Variants whose contact opens are left out of all but contact forces." if opened else ""
 
 
 def _of_cells(results: Results, end: End) -> Extreme:
@@ -280,7 +301,7 @@ def _range(study_results: Results, name: str, sensor: str, array: xr.DataArray) 
     if errors is not None and np.isfinite(errors).any() and np.nanmin(values) == np.nanmax(values):
         ends = [np.nanargmax(errors)] * 2  # of one value that is the same everywhere the largest error is told
     smallest, largest = (_extreme(study_results, array, end, errors) for end in ends)
-    kept = np.asarray(study_results.kept.values)
+    kept = study_results.with_values
     having = (int(np.isfinite(values[kept]).sum()), int(kept.sum())) if array.dims == study_results.dims else (0, 0)
     percentiles = np.nanpercentile(values, study_results.study.output.percentiles)
     stem = name.removesuffix("_max").removesuffix("_min")

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from results_schema.errors import BadInput
 from results_schema.lazy_imports import xr
 from results_schema.store import files
+from studies.protocol.study import kind_of
 from studies.results.axes import Axis
 from studies.results.formatting import typed_unit
 from studies.results.results import Results
@@ -44,23 +45,35 @@ def _write_parquet(path: Path, tables: Iterable[pd.DataFrame]) -> None:
 WRITERS = {".csv": _write_csv, ".parquet": _write_parquet}
 
 
-def write_table(results: Results, path: Path, chosen: Sequence[str] = ()) -> list[str]:
+def export(dataset: xr.Dataset, path: Path | str, results: Sequence[str] = (), *, overwrite: bool = False) -> Path:
+    """Write the table of a dataset as a CSV file, or as Parquet, as the command `export` does; its path.
+
+    results: names of those that it has beside the swept numbers and the status, all where none is named. Raises as
+    `write_table`, and BadInput for what is no whole dataset of a study.
+    """
+    found = Results.of(dataset)
+    kind_of(found.study)  # which declares its results
+    write_table(found, Path(path), results, overwrite=overwrite)
+    return Path(path)
+
+
+def write_table(results: Results, path: Path, chosen: Sequence[str] = (), *, overwrite: bool = False) -> list[str]:
     """Write the table of an archive as the path's ending asks; the results that have no place in it.
 
-    chosen: as of `table_of`. Raises BadInput (unknown ending, no such place or result, a file is there, pyarrow is not
-    installed) and OutputFailed.
+    chosen: as of `table_of`. Raises BadInput (unknown ending, no such place or result, a file is there and not to be
+    replaced, pyarrow is not installed) and OutputFailed.
     """
     if path.suffix not in WRITERS:
         expected = f"a name that ends in {' or '.join(WRITERS)}"
         raise BadInput("unknown sort of table", where=str(path), expected=expected, received=path.suffix or "no ending")
-    files.check_new_place(path)
+    (files.check_output_place if overwrite else files.check_new_place)(path)
     parts = _parts(results)
     table, left_out = table_of(next(parts), chosen)
     if nowhere := [name for name in chosen if name in left_out]:
         what, expected = f"{nowhere[0]} has other dimensions than a table's rows", "results with one number a variant"
         ends = [name for name in (f"{nowhere[0]}_max", f"{nowhere[0]}_min") if name in results.dataset]
         remedy = f"its extremes, {','.join(ends)}" if ends else ""
-        raise BadInput(what, where="--results", expected=expected, received=nowhere[0], remedy=remedy)
+        raise BadInput(what, where="results", expected=expected, received=nowhere[0], remedy=remedy)
     tables = chain([table], (table_of(part, chosen)[0] for part in parts))
     try:
         files.write_whole(path, partial(WRITERS[path.suffix], tables=tables))
@@ -123,7 +136,7 @@ def _chosen(results: Results, names: Sequence[str]) -> xr.Dataset:
             near = get_close_matches(name, known, n=1)
             remedy = f'did you mean "{near[0]}"?' if near else ""
             expected = f"one of {len(known)} results, which info --all lists"
-            raise BadInput("no such result", where="--results", expected=expected, received=name, remedy=remedy)
+            raise BadInput("no such result", where="results", expected=expected, received=name, remedy=remedy)
     kept = {*names, *(axis.name for axis in results.axes), *dataset.dims, "status"}
     return dataset.drop_vars([name for name in dataset.variables if name not in kept])
 

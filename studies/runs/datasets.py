@@ -18,11 +18,7 @@ from studies.runs.identity import run_key
 from studies.runs.not_audited import PYTHON, WHY
 from studies.runs.provenance import attributes
 
-#: Ends of names that other formats have, and what xarray writes them by.
-OTHER_FORMATS = {
-    ".csv": 'to_dataframe().to_csv("a.csv")',
-    ".parquet": 'to_dataframe().to_parquet("a.parquet")',
-}
+TABLES = ".csv", ".parquet"  # ends of names of tables
 
 
 def archive_of(dataset: xr.Dataset, path: Path | str, study: Study | None = None) -> Archive:
@@ -34,8 +30,9 @@ def archive_of(dataset: xr.Dataset, path: Path | str, study: Study | None = None
     from engine.batch.dataset import model_groups
 
     results = Results.of(dataset, study)
+    kind = kind_of(results.study)  # which declares its results
     _check_own(results)
-    key = run_key(results.study, kind_of(results.study).parts(results.study).names)
+    key = run_key(results.study, kind.parts(results.study).names)
     seconds = float(dataset.attrs.get("run_seconds", 0.0))
     marched = bool(results.study.carriage) and results.study.output.keeps_variants
     why = {WHY: dataset.attrs.get(WHY, PYTHON)} if results.study.solver.audit != 0 and marched else {}
@@ -52,8 +49,8 @@ def write(dataset: xr.Dataset, path: Path | str, study: Study | None = None, *, 
     else at that place, or where the dataset is no longer what its study gives, and OutputFailed.
     """
     path = Path(path)
-    if path.suffix in OTHER_FORMATS:
-        what, remedy = "an archive is a netCDF file", f"the command export, or dataset.{OTHER_FORMATS[path.suffix]}"
+    if path.suffix in TABLES:
+        what, remedy = "an archive is a netCDF file", f'studies.export(dataset, "{path.name}")'
         raise BadInput(what, where=str(path), expected="a name that ends with .nc", remedy=remedy)
     files.check_output_place(path)
     if overwrite:

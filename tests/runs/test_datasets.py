@@ -1,5 +1,7 @@
 """Datasets from Python as archives and answers: those that went through files, and those that are refused."""
 
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -55,9 +57,41 @@ def test_archives_have_names_of_netcdf_files_and_replace_what_they_are_told_to(t
     """A "found.csv" was a netCDF file, and the message on a file that is there did not name `overwrite`."""
     found = scenes.run("passage", PASSAGES)
     said = refused(studies.write, found, tmp_path / "found.csv")
-    assert "to_csv" in said and "ends with .nc" in said and not list(tmp_path.iterdir())
+    assert 'studies.export(dataset, "found.csv")' in said and "ends with .nc" in said and not list(tmp_path.iterdir())
     path = studies.write(found, tmp_path / "found.nc")
     assert "overwrite=True" in refused(studies.write, found, path)
+
+
+FIRST = """
+import sys
+import xarray, studies
+name, *others = sys.argv[1:]
+with xarray.open_dataset("found.nc") as found:
+    getattr(studies, name)(found, *others)
+"""
+
+
+@pytest.mark.parametrize("call", ["write other.nc", "report page", "export found.csv", "answer", "figures", "errors"])
+@pytest.mark.parametrize("kind", ["passage", "asymmetry"])
+def test_an_archive_is_known_to_a_fresh_process(kind: str, call: str, tmp_path: Path) -> None:
+    """`report` and `write` refused every archive whose kind of study had not been used before."""
+    studies.write(scenes.run(kind, scenes.pace(kind)), tmp_path / "found.nc")
+    order = [sys.executable, "-c", FIRST, *call.split()]
+    done = subprocess.run(order, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_dataset_is_exported_as_the_command_does(tmp_path: Path) -> None:
+    found, results = scenes.run("passage", PASSAGES), ("midspan_max", "moment_min")
+    archive = studies.write(found, tmp_path / "found.nc")
+    by_command, by_call = tmp_path / "command.csv", tmp_path / "call.csv"
+    assert main(["export", str(archive), str(by_command), "--results", ",".join(results)]) == 0
+    assert studies.export(found, by_call, results) == by_call
+    assert by_call.read_bytes() == by_command.read_bytes()
+    assert "there is a file already" in refused(studies.export, found, by_call)
+    studies.export(found, by_call, overwrite=True)
+    assert len(by_call.read_bytes()) > len(by_command.read_bytes())
+    assert "no such result" in refused(studies.export, found, tmp_path / "other.csv", ["deflection"])
 
 
 def test_what_was_selected_from_a_dataset_is_told_from_its_whole() -> None:

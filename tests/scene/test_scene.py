@@ -65,6 +65,7 @@ def test_a_study_of_python_becomes_a_file(path: Path, tmp_path: Path) -> None:
     assert load(again).with_values({"title": "another"}).toml() != keywords.toml()
     with pytest.raises(BadInput, match=r"copy.toml: there is a file already"):
         study.save(tmp_path / "copy.toml")
+    assert study.save(again, overwrite=True).read_bytes() == path.read_bytes()
 
 
 def test_copies_keep_everything() -> None:
