@@ -283,7 +283,7 @@ def make_plan(
     window: Window = "whole" if reduction is None else "last-cycle"
     accelerated = "{carriage}_acceleration_across" in {variable.name for variable in declarations(results)}
     base = base_scene(study)
-    asked = Asked(study, reduction, window, accelerated, base.loaded_at_once)
+    asked = Asked(study, reduction, window, accelerated, base.loaded_at_once, base.has_unsprung)
     check_memory(study, cases.size, min(IN_MEMORY, 8 * cases.size * numbers_per_variant(asked)))
     grids, members = [], []
     for scene, variants in scenes(study, cases, np.arange(cases.size, dtype=np.int64)):

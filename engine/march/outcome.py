@@ -40,13 +40,14 @@ Flat = dict[str, NDArray[Any]]
 @dataclass(frozen=True, eq=False)
 class Asked:
     """What a study reports of a variant. accelerated: whether its kind keeps the carriages' accelerations. at_once:
-    whether a load comes onto a body at an instant, where that gives way."""
+    whether a load comes onto a body at an instant, where that gives way. unsprung: whether a mass touches one."""
 
     study: Study
     reduction: Reduction | None
     window: Window
     accelerated: bool = False
     at_once: bool = False
+    unsprung: bool = False
 
     @property
     def keeps_histories(self) -> bool:

@@ -155,6 +155,11 @@ class SceneModel:
         """Whether a load comes onto a body at an instant, at a place that gives way: every mode is struck then."""
         return any(self._comes_at_once(load) for carriage in self.carriages for load in carriage.attachments)
 
+    @property
+    def has_unsprung(self) -> bool:
+        """Whether a mass touches a body without a spring."""
+        return any(carriage.inertia != "force" for carriage in self.carriages)
+
     def _comes_at_once(self, load: Attachment) -> bool:
         if load.rider is None or (self.study.start == "equilibrium" and self.riders[load.rider].stays):
             return False

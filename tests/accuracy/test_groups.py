@@ -19,7 +19,7 @@ from results_schema.status import Fidelity, Status
 from results_schema.store.rows import Collector
 from tests.accuracy.chosen import STUDIES, chosen_plan, run_of
 from tests.accuracy.passages import OPEN, only_grid, passages
-from tests.engine.build import Table, beam, cruise, fixed, mass, study, swing, under
+from tests.engine.build import Table, beam, cruise, fixed, force, mass, oscillator, study, swing, under
 
 HARD = mass(1.0, cruise(0.0, 1.0, 3.0))  # of which moments are far from 1e-6 with any modes
 TIGHT = {"tolerance": 1e-6}
@@ -288,3 +288,21 @@ def test_what_loads_strike_at_once_is_told_where_it_hardly_converges(
     told = {result.name for result in results_of(plan.asked) if np.isnan(result.tolerance)}
     struck = {"reaction", "reaction_max", "reaction_min", "reaction_rms", "moment"}
     assert told & {*struck, "place", "moment_max", "asked", "asked_max"} == (struck if at_once else set())
+
+
+@pytest.mark.parametrize(
+    ("carriage", "struck"),
+    [
+        (force(1.0, cruise(0.0, 1.0, 1.0)), set()),
+        (oscillator(0.1, 50.0, cruise(0.0, 1.0, 1.0)), set()),
+        (oscillator(0.1, 50.0, cruise(0.0, 1.0, 1.0), wheel_mass=0.02), {"counted"}),
+        (mass(0.1, cruise(0.0, 1.0, 1.0)), {"counted"}),
+    ],
+)
+def test_histories_of_accelerations_under_unsprung_masses_are_told(carriage: Table, struck: set[str]) -> None:
+    """Of the modes up to a frequency: of 393 passages of eight axles 87 missed 1e-3 by 3e-3 at a few instants."""
+    counted = fixed(0.4, "acceleration") | {"frequency_limit": 20.0}
+    sensors = {"counted": counted, "asked": counted | {"tolerance": 1e-2}, "place": fixed(0.4)}
+    plan = make_plan(study(beam(), carriage, sensor=sensors, output={"histories": "all"}))
+    told = {result.name for result in results_of(plan.asked) if np.isnan(result.tolerance)}
+    assert told & {"counted", "counted_max", "counted_rms", "asked", "asked_max", "place"} == struck
