@@ -7,7 +7,7 @@ import pytest
 
 import studies
 from studies.reporting import answers
-from studies.results.formatting import quantity
+from studies.results.formatting import listed, quantity
 from studies.results.results import Results
 from tests.engine.build import beam, force, study
 from tests.kinds.test_residual import MOVE, stops
@@ -29,8 +29,18 @@ def test_each_value_of_what_is_no_motion_has_its_best_motion_in_words_and_on_a_m
     assert np.isfinite(times).all()
     best = [times.sel(load=load).values for load in (1.0, 2.0)]
     places = [np.unravel_index(int(np.argmin(one)), one.shape) for one in best]
+    ends = [
+        [
+            name
+            for name, at, size in zip(("acceleration", "jerk"), place, best[0].shape, strict=True)
+            if at in (0, size - 1)
+        ]
+        for place in places
+    ]
+    at_an_end = {0: "", 1: ", an end of the swept ", 2: ", ends of the swept "}
     words = [
-        f"{quantity(float(one[place]), 's')} at {results.at((*place, k)).rpartition(', ')[0]} (load {k + 1} N)"
+        f"{quantity(float(one[place]), 's')} at {results.at((*place, k)).rpartition(', ')[0]}"
+        f"{at_an_end[len(ends[k])]}{listed(ends[k])} (load {k + 1} N)"
         for k, (one, place) in enumerate(zip(best, places, strict=True))
     ]
     (said,) = (text for text in answers.answer(found) if "at rest" in text)
