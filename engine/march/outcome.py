@@ -269,12 +269,8 @@ def _status(model: SceneModel, marched: Marched) -> tuple[NDArray[np.int8], NDAr
     first = np.min(np.where(bad >= 0.0, bad, np.inf), axis=0)
     sensors = len(marched.statistics) - len(marched.unrecorded)
     reactive = [number for number, force in enumerate(contacts_that_react(model)) if model.reacts(force.carriage)]
-    below = np.concatenate(
-        [
-            marched.statistics[[sensors + c for c in reactive], layout.BELOW_AT],
-            marched.unrecorded[reactive, layout.BELOW_AT],
-        ]
-    )
+    both = marched.statistics[[sensors + c for c in reactive]], marched.unrecorded[reactive]
+    below = np.concatenate([part[:, layout.BELOW_AT] for part in both])
     separated = (below >= 0.0).any(axis=0)
     status = np.where(separated, np.int8(Status.SEPARATED), np.int8(Status.OK))
     status = np.where(marched.status != Status.OK, marched.status, status).astype(np.int8)

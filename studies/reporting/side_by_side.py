@@ -20,13 +20,13 @@ MOST_COLUMNS = 4  # values of a swept number, more of which are no few
 def side_by_side(results: Results, found: Sequence[Range]) -> TextTable | None:
     """Those of some ranges that change, for each value of the number with few that changes results most, with where in
     the rest of the sweep they are; None where no number has few values beside one with more, or a direction."""
+    results = speaking(results)
     axis = _few(results)
     wanted = [(one.name, one.sensor) for one in found if not one.is_constant]
     if axis is None or not wanted:
         return None
     order = np.argsort(-axis.values if axis.sets(DIRECTION) else axis.values)
-    parts = (_part(speaking(results), axis, n) for n in order)
-    columns = [{(one.name, one.sensor): one for one in in_tables(part)} for part in parts]
+    columns = [{(one.name, one.sensor): one for one in in_tables(_part(results, axis, n))} for n in order]
     headings = ("result", *(axis.value(n) if axis.sets(DIRECTION) else axis.at(n) for n in order))
     rows = [(" ".join(own).strip(), *(_cell(column.get(own), axis) for column in columns)) for own in wanted]
     return TextTable(_title(results, axis, [name for name, _ in wanted]), headings, rows)
