@@ -1,10 +1,12 @@
 """Remarks of carriages: swept limits of motions that some variants do not reach, wheels that stay level, runs that end
 with a train, loads that vanish on their way or point up, masses that hardly swing on their springs; and bands of
-settling that are no band."""
+settling that are no band; units that are a prefix off."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +21,8 @@ RINGS = 5.0  # first periods after a train: of two spans 3.4 m/s2 were seen afte
 SHORT = 0.5  # of the length of the body: a way of a load that passes; cranes' are nine tenths of theirs
 WIDE = 0.1  # of the length: a band within which everything has settled
 SLOW = 0.1  # Hz, of a mass on its spring: vehicles swing at 0.5 to 20 Hz, and at a thirtieth of that on N/m for kN/m
+FARTHEST = 100.0  # m from axle to axle: those of the longest wagons stand 20 m apart
+_THOUSANDTHS = re.compile(r"(?<=[\d ./*])m(?:Pa\b|N\b(?=\s*\S))")  # of pascals, and of what loads are not
 BELOW = 1e-9  # relative: a limit that is missed by more is not reached
 
 
@@ -148,6 +152,33 @@ def does_not_swing(plan: Plan) -> Iterator[str]:
                 f"the sprung mass of {table.replace('.', ' ')}, of {frequencies.max():.3g} Hz on its spring, is damped "
                 f"by up to {ratios.max():.3g} times what lets it swing: is its mass right, in kg?"
             )
+
+
+def far_apart(plan: Plan) -> Iterator[str]:
+    """One sentence for every train whose axles stand farther apart than any do."""
+    for name, train in plan.study.train.items():
+        apart = float(np.diff(train.distances, prepend=0.0).max()) * train.spacing_scale
+        if apart > FARTHEST:
+            length = train.length
+            yield f"axles of train {name} stand up to {apart:g} m apart, {length:g} m in all: were millimetres meant?"
+
+
+def in_thousandths(plan: Plan) -> Iterator[str]:
+    """One sentence for every value that is written in millinewtons or millipascals."""
+    for key, text in _texts(plan.study.data):
+        if found := _THOUSANDTHS.search(text):
+            unit, large = found[0], f"M{found[0][1:]}"
+            yield f'{key} = "{text}": {unit} is a thousandth of {unit[1:]}; was {large}, a million, meant?'
+
+
+def _texts(table: Any, here: str = "") -> Iterator[tuple[str, str]]:
+    """All texts of a study file by their dotted keys."""
+    entries = table.items() if isinstance(table, Mapping) else enumerate(table)
+    for key, value in entries:
+        if isinstance(value, str):
+            yield f"{here}{key}", value
+        elif isinstance(value, Mapping | list | tuple):
+            yield from _texts(value, f"{here}{key}.")
 
 
 def has_unit(study: Study, path: str) -> bool:

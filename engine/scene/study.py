@@ -352,8 +352,7 @@ def verify(study: Study) -> None:
     for check in checks(study):
         values = {key: study.value(key) for key in check.needs}
         if not check.met(values).all():
-            received = check.received(values, study.source)
-            raise study.source.fault(check.where, check.what, expected=check.expected, received=received)
+            raise check.fault(values, study.source)
 
 
 def checks(study: Study) -> Iterator[Check]:

@@ -262,5 +262,4 @@ def broken(study: Study, cases: Cases, check: Check) -> tuple[Mapping[str, Any],
 
 def _refuse(study: Study, check: Check, values: Mapping[str, Any], entries: Mapping[str, int]) -> NoReturn:
     places = ", ".join(f"sweep.{name} entry {entry}" for name, entry in entries.items())
-    received = f"{check.received(values, study.source)} ({places})"
-    raise study.source.fault(check.where, check.what, expected=check.expected, received=received)
+    raise check.fault(values, study.source, f" ({places})")

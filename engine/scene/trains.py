@@ -39,7 +39,7 @@ class Train(Spec):
     axles: how many, which a list of distances tells too. spacing: m from every axle to the next, or one for each,
     from the front. spacing_scale, load_scale: factors of all distances, and of all forces and masses.
     loads, springs: keys of numbers that are the same for all axles, or listed for each from the front; the former are
-    those that `load_scale` multiplies, in `units`.
+    those that `load_scale` multiplies, in `units`. unsprung: that of the mass which moves with the body; "" for none.
     """
 
     looked_for: ClassVar[Mapping[str, str]] = {
@@ -48,6 +48,7 @@ class Train(Spec):
     }
     units: ClassVar[str] = "kg"
     loads: ClassVar[tuple[str, ...]] = ()
+    unsprung: ClassVar[str] = ""
     springs: ClassVar[tuple[str, ...]] = ()
 
     kind: str
@@ -84,6 +85,11 @@ class Train(Spec):
     def load(self) -> float:
         """N or kg of all its axles together."""
         return float(self.axle_loads.sum())
+
+    @property
+    def unsprung_mass(self) -> float:
+        """kg of all axles together that move with the body."""
+        return self.scale(self.unsprung) * sum(self.own(self.unsprung)) if self.unsprung else 0.0
 
     def in_step(self, wavelength: Array) -> Array:
         """The part of its load that pushes in step with a wave of so many m (L,): the train's spectrum
@@ -183,6 +189,7 @@ class MassTrain(Train):
     """Rigid masses in kg that stay in contact; their weights act."""
 
     loads = ("mass",)
+    unsprung = "mass"
     kind: Literal["mass"]
     mass: OneOrEach[Annotated[Mass, Field(gt=0)]]
     inertia_along: bool = False
@@ -193,6 +200,7 @@ class OscillatorTrain(Train):
     """Sprung masses, each on a wheel of its own."""
 
     loads = ("mass", "wheel_mass")
+    unsprung = "wheel_mass"
     springs = ("stiffness", "damping")
     kind: Literal["oscillator"]
     mass: OneOrEach[Annotated[Mass, Field(gt=0)]]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from engine.study_file.document import Source
+    from results_schema.errors import BadInput
 
 # Sizes, beside 0, of what studies are made of in SI units: from the inertia of molecules to what stands for infinite.
 # Whatever is taken to the fourth power on the way to a deflection stays within the range of floating-point numbers.
@@ -44,16 +45,20 @@ class Check:
     holds: Callable[..., Any]
     what: str
     expected: str
+    remedy: str = field(default="", kw_only=True)
 
     def met(self, values: Mapping[str, Any]) -> NDArray[np.bool_]:
         """Verdict for values by dotted key, of their broadcast shape."""
         return np.asarray(self.holds(*(values[key] for key in self.needs)), dtype=bool)
 
-    def received(self, values: Mapping[str, Any], source: Source) -> str:
-        """The deciding numbers in words, for an error."""
-        return ", ".join(f"{source.written(key)} = {values[key]:.10g}" for key in self.needs[:6])
+    def fault(self, values: Mapping[str, Any], source: Source, places: str = "") -> BadInput:
+        """The error with the deciding numbers in words; places: where in a sweep they are."""
+        numbers = ", ".join(f"{source.written(key)} = {values[key]:.10g}" for key in self.needs[:6])
+        received, remedy = f"{numbers}{places}", self.remedy
+        return source.fault(self.where, self.what, expected=self.expected, received=received, remedy=remedy)
 
 
 def on_body(where: str, needs: tuple[str, str], what: str) -> Check:
     """A place on a body: needs names the place and the body's length."""
-    return Check(where, needs, lambda at, length: (at >= 0) & (at <= length), what, "0 to the body's length")
+    expected, remedy = "0 to the body's length", "another place, or another unit of the place or of the length"
+    return Check(where, needs, lambda at, length: (at >= 0) & (at <= length), what, expected, remedy=remedy)

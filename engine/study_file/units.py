@@ -160,6 +160,8 @@ def _split(text: str, wanted: Unit) -> tuple[str, str]:
         endless = text.strip().casefold() in _RIGID
         remedy = NO_JERK if wanted.symbol == JERK and endless else ""
         remedy = stiff if "stiffness" in wanted.noun and endless else remedy
+        if wanted.noun == "length" and text.strip().isalpha():
+            remedy = 'places are numbers: "7.5 m" is the middle of 15 m'
         raise fault(f"this text is not {wanted.article}", expected=example, received=shortened(text), remedy=remedy)
     if not match[2]:
         raise fault("a number in quotes has no unit", expected=example, received=shortened(text))
@@ -236,6 +238,9 @@ def _meant_here(number: str, unit: str, wanted: Unit, exponents: tuple[int, int,
             return f'did you mean "{number} {other}"?'
     if unit == "g" and wanted.noun == "acceleration":
         return f'g is gram; {number} g of gravity is "{float(number) * 9.81:.3g} m/s2"'
+    if wanted.noun == "mass" and exponents == (1, 1, -2):
+        weight = float(Fraction(number) * _unit_factor(unit)[0])
+        return f'the mass of that weight is "{weight / 9.81:.6g} kg"; a carriage of kind = "force" is a weight alone'
     if wanted.noun == "density" and exponents == (-1, 1, 0):
         per_length = float(Fraction(number) * _unit_factor(unit)[0])
         return f'divide it by the area; a beam may have area = "1 m2" with density = "{per_length:.10g} kg/m3"'

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -101,8 +102,10 @@ def _as_archive_error(path: Path) -> Iterator[None]:
 
 def _check_signature(path: Path) -> None:
     if not path.exists():
-        near = path.with_name(f"{path.name}.nc")
-        raise BadInput("no such file", where=str(path), remedy=f'did you mean "{near}"?' if near.exists() else "")
+        others = (own.stem for own in path.parent.glob("*.nc"))  # all have the same ending
+        near = get_close_matches(path.name.removesuffix(".nc"), others, 1)
+        remedy = f'did you mean "{path.with_name(near[0])}.nc"?' if near else ""
+        raise BadInput("no such file", where=str(path), remedy=remedy)
     if not path.is_file():
         raise BadInput("not a file", where=str(path), expected="an archive (.nc)")
     try:

@@ -27,7 +27,7 @@ from results_schema.arrays import Array
 from studies.commands import planned_numerics as chosen
 from studies.commands.forecast import AROUND, Forecast, forecast
 from studies.commands.sampled import sampled
-from studies.findings.in_step import speeds_in_step
+from studies.findings.in_step import WITH_MASSES, speeds_in_step
 from studies.protocol.parts import Foreseen, Pieces, TextTable, Variants
 from studies.results.axes import Axis
 from studies.results.findings_common import has_dampers, told_trains
@@ -312,8 +312,8 @@ def _in_step(plan: Plan) -> Iterator[TextTable]:
             )
             for one in found
         ]
-        alone = f", of {train.on} without masses on it" if study.carriage[axle].inertial else ""
-        heading = f"Speeds at which axles of {name} push in step with a frequency{alone or f' of {train.on}'}"
+        heading = f"Speeds at which axles of {name} push in step with a frequency of {train.on}"
+        heading += WITH_MASSES * (train.unsprung_mass > 0.0)
         yield TextTable(
             heading, ("speed", "frequency", "way in a period", "part of its load", "swing of its mode"), rows
         )

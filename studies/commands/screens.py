@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -130,7 +130,7 @@ def show_outcome(outcome: Outcome) -> None:
     if not summary.is_measured(outcome.results):  # the grid of those that measure is of methods: its ends say nothing
         found = summary.in_tables(results)
         show_ranges(found, results.percentiles, summary.every(results), side_by_side(results, found))
-        paragraphs(*filter(None, [summary.left_out(results)]))
+        paragraphs(*told_loosely(found, results.status_counts), *filter(None, [summary.left_out(results)]))
         _percentiles(results, [_name(one) for one in found][:MOST_ROWS])
     _show_accuracy(outcome, results)
 
@@ -200,15 +200,19 @@ def show_ranges(
         paragraphs(f"The same in {every}: {', '.join(same[:MOST_ALIKE])}{more}.")
     if some := [f"{words} {one.partly}" for one, words in alike if one.partly]:
         paragraphs(f"The same where there is one: {', '.join(some[:MOST_ALIKE])}.")
-    if loose := [one for one in found if one.is_loose]:
-        words = ", ".join(f"{_name(one)} {one.said(one.extreme)}" for one in loose)
-        paragraphs(f"Told errors of more than a tenth of the value: {words}.{_closer(loose)}")
 
 
-def _closer(loose: Sequence[Range]) -> str:
-    """What tells residual vibrations closer, which are held to a part of a sensor's largest static value."""
+def told_loosely(found: Sequence[Range], occurring: Container[Status]) -> list[str]:
+    """The results of a sweep whose error is large beside them. Residual vibrations are held to a part of a sensor's
+    largest static value: what tells them closer, unless that is missed as it is. occurring: statuses of variants."""
+    loose = [one for one in found if one.is_loose and one.extreme.words]
+    if not loose:
+        return []
     ringing = next((one.name.removesuffix(RESIDUAL) for one in loose if one.name.endswith(RESIDUAL)), "")
-    return f" Residual vibrations are told closer by a smaller tolerance (sensor.{ringing}.tolerance)." * bool(ringing)
+    closer = f" Residual vibrations are told closer by a smaller tolerance (sensor.{ringing}.tolerance)."
+    words = ", ".join(f"{_name(one)} {one.said(one.extreme)}" for one in loose)
+    helps = ringing and Status.TOLERANCE_MISSED not in occurring
+    return [f"Told errors of more than a tenth of the value: {words}.{closer if helps else ''}"]
 
 
 def _where(found: Range) -> str:

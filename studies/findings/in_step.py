@@ -4,7 +4,7 @@ whether such a resonance may lie between the speeds of a sweep."""
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,13 +12,15 @@ import numpy as np
 from engine.model.scene_model import UNFELT
 from engine.scene.sensors import Envelope, Sensor
 from engine.scene.study import Study
-from engine.scene.trains import Train
+from engine.scene.trains import Train, axle_name
 from results_schema.arrays import Array, Counts
 from results_schema.lazy_imports import xr
 from results_schema.quantities import QUANTITIES
+from studies.findings.amplification import sizes
 from studies.findings.theory import along_track
 from studies.results.axes import VARIANT, Axis
-from studies.results.formatting import ALIKE, percent
+from studies.results.formatting import ALIKE, number, percent
+from studies.results.places import Index
 from studies.results.results import Results
 
 #: Speeds that are looked at between the lowest and the highest, and the part of a train's load that has to push in
@@ -29,6 +31,10 @@ MODES, MOST = 4, 8  # that are looked at, the lowest that move the track; speeds
 WAYS = 4.0  # lengths of a train: the wave along which its axles push the least together is shorter
 LEAST = 0.05  # of the largest swing: what is less builds up to nothing
 ACCELERATION, NO_DECAY = 2, 1e-12  # order by time
+TOLD_OF_LARGEST = 0.2  # of what is read, at least, a swing that the answer tells
+BEYOND = 1.5  # times the highest speed of a sweep, up to which it may be what values climb to
+DAMPING = ".damping_ratio"  # which moves no speed
+WITH_MASSES = " with them on it"
 
 
 class InStep(NamedTuple):
@@ -64,7 +70,7 @@ def speeds_in_step(
     units, newtons = "m s-2" if read else "m", train.load * (1.0 if train.units == "N" else study.gravity)
     seen = read or [one for one in of_body if QUANTITIES[one.quantity].unit == "m"]
     for mode in _modes(body, max((one.frequency_limit or np.inf for one in read), default=np.inf)):
-        own = body.isel({body["frequency"].dims[0]: mode})
+        own = _with_masses(body.isel({body["frequency"].dims[0]: mode}), train)
         frequency = float(own["frequency"])
         share = train.in_step(speeds / frequency)
         swings = newtons * share * _per_newton(train, own, speeds) * _moved(own, seen)
@@ -77,6 +83,24 @@ def speeds_in_step(
         found += [InStep(speed, frequency, part, swing, units) for speed, part, swing in numbers]
     strongest = sorted(found, key=lambda one: one.swing)[-MOST:]
     return sorted((one for one in strongest if one.swing >= LEAST * strongest[-1].swing), reverse=True)
+
+
+def _with_masses(mode: xr.Dataset, train: Train) -> xr.Dataset:
+    """A mode of the body as it swings with the train's masses on it, on average over their places: with 1 + mu of its
+    own mass, mu their mass per m times the integral of the shape squared over what they cross."""
+    x, shape = _crossed(train, mode)
+    spread = max(train.length * train.count / (train.count - 1), x[-1] - x[0])  # of a short one as many are on it
+    more = 1.0 + train.unsprung_mass / spread * float(np.trapezoid(shape**2, x))
+    frequency, damping_ratio = (mode[name] / np.sqrt(more) for name in ("frequency", "damping_ratio"))
+    return mode.assign(frequency=frequency, damping_ratio=damping_ratio, mode_shape=mode["mode_shape"] / np.sqrt(more))
+
+
+def _crossed(train: Train, mode: xr.Dataset) -> tuple[Array, Array]:
+    """Places (S,) that a train crosses, evenly, and a mode's shape there (S,)."""
+    x = along_track(mode)
+    low, high = np.clip(train.motion.range(), x[0], x[-1])
+    crossed = np.linspace(low, high, x.size)
+    return crossed, np.interp(crossed, x, mode["mode_shape"].values)
 
 
 def _longest_way(train: Train) -> float:
@@ -108,15 +132,81 @@ def _per_newton(train: Train, mode: xr.Dataset, speeds: Array) -> Array:
     After a force F at a speed v it rings with F omega/v |integral of its shape times exp(i omega x/v) dx|, after a
     train with that of the sum of its forces in step, of which damping leaves the mean over the time in which they come.
     """
-    omega, x, shape = 2.0 * np.pi * float(mode["frequency"]), along_track(mode), mode["mode_shape"].values
-    low, high = np.clip(train.motion.range(), x[0], x[-1])
-    crossed, wave = np.linspace(low, high, x.size), omega / speeds
-    phi = np.interp(crossed, x, shape)
+    omega, (crossed, phi) = 2.0 * np.pi * float(mode["frequency"]), _crossed(train, mode)
+    wave = omega / speeds
     turned = np.exp(1j * wave[:, None] * crossed)
     ends = (turned[:, -1] * phi[-1] - turned[:, 0] * phi[0]) / (1j * wave)  # by parts, as the shape bends little
     integral = ends + np.diff(turned, axis=1) @ (np.diff(phi) / np.diff(crossed)) / wave**2  # between two places
     decay = np.maximum(float(mode["damping_ratio"]) * wave * train.length, NO_DECAY)
     return np.asarray(np.abs(integral) * wave * -np.expm1(-decay) / decay)
+
+
+def trains_in_step(
+    results: Results,
+    axis: Axis,
+    held: Mapping[str, int],
+    between: tuple[float, float],
+    readers: Collection[Sensor | Envelope],
+) -> dict[str, list[tuple[float, InStep]]]:
+    """By train, the values of a swept speed at which its axles push in step, with that; held: the place along other
+    dimensions. Without trains of another pace, and those of which there are several as nothing holds what is swept."""
+    found = dict[str, list[tuple[float, InStep]]]()
+    for name in results.study.train:
+        factor, scene = axis.targets.get(f"carriage.{axle_name(name, 0)}.motion.speed"), _held(results, name, held)
+        if factor is not None and scene is not None:
+            study, body = scene
+            told = speeds_in_step(study, name, body, (factor * between[0], factor * between[1]), readers)
+            found[name] = [(one.speed / factor, one) for one in told]
+    return found
+
+
+def _held(results: Results, name: str, held: Mapping[str, int]) -> tuple[Study, xr.Dataset] | None:
+    """The study of one train and its body, with the distances and the body's numbers that are held; None where they
+    are not, or a body out of files would have to be built anew."""
+    on, values = results.study.train[name].on, dict[str, float]()
+    for axis in results.axes:
+        keys = results.study.sweep.axes[axis.name].of
+        own = [key for key in keys if key.startswith((f"train.{name}.spacing", f"body.{on}.")) and DAMPING not in key]
+        if own and axis.dim not in held:
+            return None
+        values |= {key: axis.values[held[axis.dim]].item() for key in own}
+    known = on in results.models and not any(key.startswith("body.") for key in values)
+    if (values or not known) and any(results.recorded(body) is not None for body in results.study.body):
+        return None
+    from engine.batch.dataset import model_groups
+    from engine.model.distinct_models import base_scene
+
+    study = results.study.without_sweep().with_values(values)
+    return study, results.models[on] if known else model_groups(base_scene(study))[f"/model/{on}"]
+
+
+def told_in_step(results: Results, place: Index) -> str:
+    """At which swept speed the axles of a train push in step with a frequency most strongly, or beyond where the
+    largest value, at a place of the sweep, is that of the highest speed up to which the contact holds; "" where no
+    train comes in step there, or swings the body by little of that."""
+    axis = results.axis(".motion.speed")
+    if axis is None:
+        return ""
+    held = dict(zip(results.dims, place, strict=True))
+    row = results.held[tuple(slice(None) if dim == axis.dim else entry for dim, entry in held.items())]
+    top = float(axis.values[row].max(initial=-np.inf))
+    readers: list[Sensor | Envelope] = [*results.study.sensor.values(), *results.study.envelope.values()]
+    highest = top * BEYOND if axis.values[held[axis.dim]] == top else float(axis.values.max())
+    found = trains_in_step(results, axis, held, (float(axis.values.min()), highest), readers)
+    every = [(one.swing, speed, name, one) for name, told in found.items() for speed, one in told]
+    if not every:
+        return ""
+    _, speed, name, one = max(every)
+    read = [sizes(results, sensor)[place] for sensor, units in results.sensors.items() if units == one.units]
+    if one.swing < TOLD_OF_LARGEST * max(read, default=0.0):
+        return ""
+    train = results.study.train[name]
+    where = axis.in_words(float(f"{speed * axis.factor:.3g}") / axis.factor)
+    where += ", beyond the sweep" * bool(speed > axis.values.max())
+    return (
+        f" Axles of {name} push in step with a frequency of {train.on}{WITH_MASSES * (train.unsprung_mass > 0.0)} "
+        f"({number(one.frequency)} Hz) most strongly at {where}."
+    )
 
 
 def told_between_speeds(results: Results) -> str:

@@ -39,7 +39,7 @@ from studies.findings.effects import (
     unchanged,
 )
 from studies.findings.envelopes import beyond_sensors, sizes_along, told_along
-from studies.findings.in_step import told_between_speeds
+from studies.findings.in_step import told_between_speeds, told_in_step
 from studies.findings.residual import check_residual, most_ringing, residuals
 from studies.protocol.study import Kind, question_of
 from studies.results.axes import PACES, VARIANT
@@ -99,7 +99,7 @@ class Passage(Kind):
         if sensors:  # of which those after the first may be cut
             first = sensors[0]
             said[len(envelopes)] += _limited_besides(results, first) + _amplified_besides(results, first)
-        said[0] += _effects(results, envelopes, sensors)
+        said[0] += _effects(results, envelopes, sensors) + _in_step(results, envelopes, sensors)
         lifted, kept = told_contacts(results)
         residual = residuals(results, question_of(results.study, AskedOfPassages))
         return [*residual[:1], *said[:1], *lifted, *residual[1:], *said[1:], *kept, *told_statuses(results)]
@@ -182,6 +182,13 @@ def _effects(results: Results, envelopes: list[str], sensors: list[str]) -> str:
     said = told_effects(results, values, f"the largest {what}", error)
     ways = told_both_ways(results, values, f"the largest {what}", units, error)
     return f" {said}{ways}" if said else ways
+
+
+def _in_step(results: Results, envelopes: list[str], sensors: list[str]) -> str:
+    """Where axles push in step, as seen from where what the answer begins with is largest."""
+    values = sizes_along(results, envelopes[0]) if envelopes else sizes(results, sensors[0])
+    top = largest(results, values)
+    return "" if top is None else told_in_step(results, top)
 
 
 def _amplified(results: Results, sensor: str) -> str:

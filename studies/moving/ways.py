@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -82,9 +83,8 @@ def _refuse_start(study: Study, cases: Cases, name: str) -> None:
             length = f"body.{study.carriage[name].on}.length"
             check = on_body(key, (key, length), "on a body in a frame that moves a carriage starts on its track")
             if unmet := broken(study, cases, check):
-                received = check.received(unmet[0], study.source)
                 remedy = "a start on the body; of a body that stands loads come onto it in a passage"
-                raise study.source.fault(key, check.what, expected=check.expected, received=received, remedy=remedy)
+                raise replace(check, remedy=remedy).fault(unmet[0], study.source)
 
 
 def driven(study: Study) -> Iterator[str]:

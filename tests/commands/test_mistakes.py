@@ -57,6 +57,27 @@ MISTAKES = {
         SMALL.replace('kind = "mass"', 'kind = "oscillator"\nstiffness = 0.2\ndamping = 0.04'),
         0, ["trolley swings at 0.071 Hz", "kilonewtons per metre meant?", "0.0712 to 0.225 Hz  0.0447 to 0.141"],
     ),
+    "millinewtons": (
+        SMALL.replace('kind = "mass"', 'kind = "oscillator"\nstiffness = "2 mN/m"'),
+        0, ['carriage.trolley.stiffness = "2 mN/m"', "a thousandth of N; was MN, a million, meant?"],
+    ),
+    "millipascals": (OTHER.replace("= 1e9", '= "210000 mPa"'), 0, ["mPa is a thousandth of Pa; was MPa"]),
+    "distances of axles in mm": (
+        SMALL[: SMALL.index("[carriage.trolley]")]
+        + '[train.ice]\nkind = "force"\non = "beam"\nforce = 1.0\nspacing = [2500, 15000, 2500]\n'
+        + 'motion = { kind = "cruise", start = 0.0, end = 1.0, speed = 5.0 }\n'
+        + '[sensor.middle]\nbody = "beam"\nat = 0.5\n',
+        0, ["axles of train ice stand up to 15000 m apart, 20000 m in all: were millimetres meant?"],
+    ),
+    "a length in mm that is in m": (
+        SMALL.replace("length = 1.0", 'length = "1 mm"'),
+        2, ["body.beam.length = 0.001", "another unit of the place or of the length"],
+    ),
+    "a mass by its weight": (
+        SMALL.replace("\nmass = 1.0", '\nmass = "180 kN"'),
+        2, ["a force (N) where a mass (kg) is wanted", '"18348.6 kg"', 'kind = "force" is a weight alone'],
+    ),
+    "a place in words": (SMALL.replace("at = 0.5", 'at = "midspan"'), 2, ["sensor.midspan.at", "places are numbers"]),
     "density in g/cm3": (SMALL.replace("= 1000.0", "= 7.85"), 0, ["density = 7.85", '"7.85 g/cm^3"']),
     "length in mm": (SMALL.replace("length = 1.0", "length = 15000"), 0, ["length = 15000 m", '"15000 mm"']),
     "a way in mm": (SMALL.replace("end = 1.0", "end = 1000"), 0, ["goes from 0 to 1000 m", "units"]),
@@ -286,6 +307,7 @@ def test_no_file_is_proposed_for_its_ending_alone(capsys: pytest.CaptureFixture[
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
+        (["report", "xx.nc"], ["no such file", 'did you mean "x.nc"?']),
         (["run", "x.nc"], ["archive of results", "wanderlast report x.nc"]),
         (["check", "x.nc"], ["archive of results", "wanderlast info x.nc"]),
         (["check", "folder"], ["this is a folder"]),

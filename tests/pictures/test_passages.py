@@ -154,7 +154,7 @@ def test_speeds_at_which_axles_push_in_step_are_marked() -> None:
         f"{number(3.6 * one.speed, 4)} km/h (tram, every {quantity(one.way, 'm')} with {number(one.frequency)} Hz)"
         for one in sorted(strongest)
     ]
-    assert f"Dotted: axles in step with a frequency of the body without them, {listed(dotted)}." in figure.caption
+    assert f"Dotted: axles in step with a frequency of the body, {listed(dotted)}." in figure.caption
     (legend,) = figure.drawing.legends
     assert [text.get_text() for text in legend.get_texts()] == ["axles in step with a frequency"]
     assert not [one for one in figures(run("")).values() if one.drawing.legends and one.name != "response"]

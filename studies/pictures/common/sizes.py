@@ -9,11 +9,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
-from engine.scene.study import Study
-from engine.scene.trains import axle_name
 from studies.findings.amplification import largest, size_errors, sizes, told_amplification
 from studies.findings.effects import HARDLY, hardly_changed
-from studies.findings.in_step import InStep, speeds_in_step
+from studies.findings.in_step import WITH_MASSES, InStep, trains_in_step
 from studies.pictures.common.figures import FLAT, INK, Figure, draw, limit_far, limit_line, telling_limits
 from studies.pictures.common.sweep_view import UNSEEN, Curve, View, along_axis, draw_curves, one_legend, ratio_above
 from studies.results.findings_common import LOOSE, in_words, told_hanging
@@ -206,36 +204,24 @@ def _told_in_step(seen: View) -> str:
         f"{seen.x.in_words(x / seen.x.factor)} ({name}, every {quantity(one.way, 'm')} with {number(one.frequency)} Hz)"
         for x, name, one in sorted(_in_step(seen))
     ]
-    return f"Dotted: {IN_STEP} of the body without them, {listed(told)}." if told else ""
+    return f"Dotted: {IN_STEP} of the body{WITH_MASSES * _rides(seen)}, {listed(told)}." if told else ""
+
+
+def _rides(seen: View) -> bool:
+    """Whether masses of a train move with its body."""
+    return any(train.unsprung_mass > 0.0 for train in seen.results.study.train.values())
 
 
 def _in_step(seen: View) -> list[tuple[float, str, InStep]]:
     """Speeds, as along the horizontal axis, at which axles of trains push in step, with their train, the strongest of
-    each, whatever the figure reads; none without the archive's bodies, or where curves are of several trains."""
-    results, axis, found = seen.results, seen.x, list[tuple[float, str, InStep]]()
-    assert axis is not None
-    for name, train in results.study.train.items():
-        factor = axis.targets.get(f"carriage.{axle_name(name, 0)}.motion.speed")
-        study = _with_held(seen, name)
-        if factor is not None and study is not None and train.on in results.models:
-            between = factor * float(axis.values.min()), factor * float(axis.values.max())
-            told = speeds_in_step(study, name, results.models[train.on], between, study.sensor.values())
-            strongest = sorted(told, key=lambda one: one.swing)[-MOST_MARKED:]
-            found += [(one.speed / factor * axis.factor, name, one) for one in strongest]
+    each, whatever the figure reads; none where curves are of several trains."""
+    assert seen.x is not None
+    between, sensors = (seen.x.values.min().item(), seen.x.values.max().item()), seen.results.study.sensor.values()
+    found = list[tuple[float, str, InStep]]()
+    for name, told in trains_in_step(seen.results, seen.x, seen.held, between, sensors).items():
+        strongest = sorted(told, key=lambda one: one[1].swing)[-MOST_MARKED:]
+        found += [(speed * seen.x.factor, name, one) for speed, one in strongest]
     return found
-
-
-def _with_held(seen: View, train: str) -> Study | None:
-    """The study with the distances of a train that the view holds; None where it shows several, or cannot have them."""
-    results, held = seen.results, dict[str, float]()
-    for axis in results.axes:
-        own = [path for path in results.study.sweep.axes[axis.name].of if path.startswith(f"train.{train}.spacing")]
-        if own and axis.dim not in seen.held:
-            return None
-        held |= {path: float(axis.values[seen.held[axis.dim]]) for path in own}
-    if held and any(results.recorded(body) is not None for body in results.study.body):
-        return None  # it is built anew, for which files would be needed
-    return results.study.without_sweep().with_values(held) if held else results.study
 
 
 def _draw_sizes(axes: Axes, seen: View, sensor: str, limit: float | None) -> None:
