@@ -12,6 +12,7 @@ import xarray as xr
 import engine
 import studies
 from results_schema.errors import BadInput
+from studies.results.results import Results
 from tests.floating.scenes import sliding_mass
 from tests.studies import scenes
 
@@ -167,3 +168,26 @@ def test_an_archive_is_written_again_where_that_is_asked_for(tmp_path: Path) -> 
     (tmp_path / "notes.nc").write_text("mine")
     with pytest.raises(BadInput, match="no archive, and is never replaced"):
         studies.write(dataset, tmp_path / "notes.nc", overwrite=True)
+
+
+def test_a_result_by_another_name_is_not_told_of() -> None:
+    """Nor a dataset without it: sentences and tables are of all results."""
+    found = scenes.run("passage")
+    for changed in (found.rename(midspan_max="largest"), found.drop_vars("midspan_max")):
+        with pytest.raises(BadInput, match="midspan_max: this dataset has lost a result of its study, or its name"):
+            studies.answer(changed)
+
+
+def test_one_result_is_exported_by_its_name(tmp_path: Path) -> None:
+    found = scenes.run("passage")
+    tables = [
+        studies.export(found, tmp_path / f"{n}.csv", own) for n, own in enumerate(["midspan_max", ["midspan_max"]])
+    ]
+    assert tables[0].read_bytes() == tables[1].read_bytes() and b"midspan_max" in tables[0].read_bytes()
+
+
+def test_swept_values_are_told_apart() -> None:
+    """By as many digits as it takes: 11.25 m/s is neither 11.2 nor 11.3."""
+    found = scenes.run("passage", 'speed = { of = "carriage.table.motion.speed", values = [11.0, 11.25, 11.5] }')
+    (axis,) = Results.of(found).axes
+    assert [axis.value(place) for place in range(3)] == ["11 m/s", "11.25 m/s", "11.5 m/s"]

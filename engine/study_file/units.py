@@ -5,6 +5,7 @@ Each dimension is an annotated float: `length: Length = Field(gt=0)`.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -238,6 +239,9 @@ def _meant_here(number: str, unit: str, wanted: Unit, exponents: tuple[int, int,
             return f'did you mean "{number} {other}"?'
     if unit == "g" and wanted.noun == "acceleration":
         return f'g is gram; {number} g of gravity is "{float(number) * 9.81:.3g} m/s2"'
+    if wanted.noun == "stiffness" and exponents == (0, 0, -1):
+        rate = float(Fraction(number) * _unit_factor(unit)[0])
+        return f"m (2 pi f)^2 of the mass m on it: {(2 * math.pi * rate) ** 2:.6g} N/m for each kg"
     if wanted.noun == "mass" and exponents == (1, 1, -2):
         weight = float(Fraction(number) * _unit_factor(unit)[0])
         return f'the mass of that weight is "{weight / 9.81:.6g} kg"; a carriage of kind = "force" is a weight alone'

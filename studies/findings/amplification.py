@@ -10,6 +10,7 @@ from engine.scene.study import Study
 from results_schema.arrays import Array
 from results_schema.lazy_imports import xr
 from results_schema.variable import outputs
+from studies.results.axes import Axis
 from studies.results.formatting import ROUNDING
 from studies.results.places import Index, extreme
 from studies.results.results import Results
@@ -46,6 +47,17 @@ def largest(results: Results, values: Array) -> Index | None:
     """The variant with the largest of values, among those whose contact holds where there are such."""
     held = results.held if np.isfinite(values[results.held]).any() else np.isfinite(values)
     return extreme(np.where(held, values, np.nan))
+
+
+def beside(results: Results, values: Array, place: Index, axis: Axis) -> Array:
+    """What the two neighbours of a place of the sweep along an axis have of values; nothing at an end of the sweep, and
+    where one of them has none."""
+    along = results.dims.index(axis.dim)
+    line = values[tuple(slice(None) if n == along else entry for n, entry in enumerate(place))]
+    order = np.argsort(axis.values)
+    at = int(np.flatnonzero(order == place[along])[0])
+    near = line[order[[at - 1, at + 1]]] if 0 < at < order.size - 1 else np.array([np.nan])
+    return near if np.isfinite(near).all() else near[:0]
 
 
 def told_amplification(results: Results, sensor: str) -> Array:

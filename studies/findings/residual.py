@@ -25,6 +25,7 @@ ALIKE = 1e-3  # of a time: by so much the best motion may differ and count as th
 MOST_BEST = 4  # values of a swept number of which each is told its best motion
 LAST = 8  # values along a swept number that are looked at: where it is swept too coarsely most of them turn
 FEWEST = 6  # of these
+NEVER = "no motion settles"
 LEAST_STEP = 0.1  # of the largest value: smaller ones do not count as up or down
 
 
@@ -105,7 +106,8 @@ def has_whole(results: Results, name: str) -> bool:
 
 
 def residuals(results: Results, asked: AskedOfRest) -> list[str]:
-    """The largest residual vibration of sensors, and where limits are exceeded."""
+    """The shortest times of move and settling, the largest residual vibration of sensors, and where limits are
+    exceeded."""
     sensors = ringing(results, asked.residual)[:MOST_SENSORS]
     said = [_residual(results, sensor, asked) for sensor in sensors]
     if sensors and not quiet(results, sensors[0]):
@@ -113,8 +115,18 @@ def residuals(results: Results, asked: AskedOfRest) -> list[str]:
         effects = told_effects(results, residual_of(results, sensors[0]), "the largest such swing", doubt)
         said[0] += f" {effects}" if effects else ""
     if together := settle_together(results):
-        said.insert(1, f"Until all of {listed(together)} have settled, {_shortest(results, together)}.")
-    return said
+        return [f"{_until(results, together)}.", *said]
+    banded = (name for name in sensors if results.study.sensor[name].settling_band is not None)
+    alone = next((name for name in banded if moves_differ(results, name)), None)
+    return [f"{_until(results, [alone])}.", *said] if alone else said
+
+
+def _until(results: Results, sensors: Sequence[str]) -> str:
+    """The shortest times until all of some sensors have settled."""
+    shortest, names = _shortest(results, sensors), listed(sensors)
+    if shortest.startswith(NEVER):
+        return f"{names}: {shortest}"
+    return f"Until {f'all of {names} have' if len(sensors) > 1 else f'{names} has'} settled, {shortest}"
 
 
 def most_ringing(results: Results) -> list[Index]:
@@ -186,8 +198,6 @@ def _settled(results: Results, sensor: str, asked: AskedOfRest, axis: Axis | Non
     if asked.settling_time is not None:
         longer = where_beyond(results, np.where(np.isnan(values), np.inf, values), asked.settling_time, axis)
         said.append(f"it takes longer than {quantity(asked.settling_time, 's')} {longer}")
-    if moves_differ(results, sensor) and not settle_together(results):
-        said.append(_shortest(results, [sensor]))
     if left:
         said.append(_not_settled(results, results.with_values & np.isnan(values), axis))
     return "".join(f"; {one}" for one in said)
@@ -227,7 +237,7 @@ def _shortest(results: Results, sensors: Sequence[str]) -> str:
     worst, same = ([axis.noun for axis in part if axis not in each] for part in (felt, set(given) - set(felt)))
     end = f", at the worst {listed(worst)}" * bool(worst) + f", whatever {listed(sorted(same))}" * bool(same)
     if not found:
-        return f"no motion settles{end}"
+        return f"{NEVER}{end}"
     return f"move and settling take at least {listed(found)}{end}{f'; no motion settles at {never}' * bool(never)}"
 
 

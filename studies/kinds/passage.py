@@ -13,6 +13,7 @@ from results_schema.variables import MARCH, declare
 from studies.findings.absolute_errors import errors_of_size
 from studies.findings.amplification import (
     DYNAMIC_AMPLIFICATION,
+    beside,
     largest,
     only_rounding,
     sizes,
@@ -51,11 +52,12 @@ from studies.results.findings_common import (
     uncertainty,
     while_held,
 )
-from studies.results.formatting import listed, number, quantity, times
+from studies.results.formatting import listed, number, percent, quantity, times
 from studies.results.places import Index
 from studies.results.results import Results
 
 MOST_SENSORS = 6
+LEAST_BESIDE = 0.03  # of the largest value: by so much less beside it a peak between may be higher by a few per cent
 #: A table whose tool is 15 um off its static way is told an amplification of 1.01.
 OF_LARGEST = (
     'It compares largest values; a sensor with part = "dynamic" reads how far it is from statics on the way, and what '
@@ -144,6 +146,7 @@ def _largest(results: Results, sensor: str) -> str:
     gain, (top, best) = told_amplification(results, sensor), _extremes(results, sensor)
     if top is None:
         return f"{sensor}: no variant has values."
+    between = _between(results, sizes(results, sensor), top)
     value = _value(results, sensor, top)
     said = f"{sensor}: {while_held(results)}the largest {results.noun(sensor)} {results.place(sensor)} is {value}"
     if same := unchanged(results, sizes(results, sensor)):
@@ -153,15 +156,15 @@ def _largest(results: Results, sensor: str) -> str:
     where = f" and {level}" if level else where
     best = top if best is not None and hardly_changed(results, gain, number) else best
     if best is None:
-        return f"{said}{where}."
+        return f"{said}{where}{between}."
     static = sizes(results, sensor)[best] / gain[best]
     amplified = times(float(gain[best]), f"the static {quantity(float(static), results.sensors[sensor])}")
     amplified += with_own_weight(results.study, sensor)
     there = f"{in_words(results, best)}{_at_the_end(results, best)}"
     if best == top or there == where:
-        return f"{said}, {amplified}{where and f',{where}'}."
+        return f"{said}, {amplified}{where and f',{where}'}{between}."
     loosely = uncertainty(results, f"dynamic_amplification {sensor}", best)
-    return f"{said}{where}; relative to statics it is largest{there}: {amplified}{loosely}."
+    return f"{said}{where}{between}; relative to statics it is largest{there}: {amplified}{loosely}."
 
 
 def _effects(results: Results, envelopes: list[str], sensors: list[str]) -> str:
@@ -257,6 +260,16 @@ def _with_remark(said: list[str], remark: str) -> list[str]:
     """Sentences with a remark behind the first that says of a limit that it is exceeded nowhere."""
     unbroken = [place for place, text in enumerate(said) if "nowhere" in text.partition(LIMIT)[2]]
     return [text + remark if place in unbroken[:1] else text for place, text in enumerate(said)]
+
+
+def _between(results: Results, values: Array, place: Index) -> str:
+    """That peaks between swept paces may be higher than the largest value, where one beside it is much less."""
+    axis = results.axis(*PACES)
+    if axis is None or axis.dim == VARIANT:
+        return ""
+    less = 1.0 - float(beside(results, values, place, axis).min(initial=values[place]) / values[place])
+    said = f" ({percent(less)} less at a {axis.noun} beside it: peaks between may be higher)"
+    return said if less > LEAST_BESIDE else ""
 
 
 def _at_the_end(results: Results, place: Index) -> str:

@@ -9,6 +9,7 @@ from studies.findings.cells import findings_of_cells
 from studies.findings.envelopes import beyond_sensors, told_envelopes
 from studies.findings.numerics_used import told_choices
 from studies.protocol.study import kind_named
+from studies.results.checks import check_named
 from studies.results.findings_common import told_statuses
 from studies.results.results import Results
 
@@ -21,12 +22,12 @@ MOST_SAID = 4  # of the sentences at the end of a run, which are to stay on the 
 
 def answer(dataset: xr.Dataset) -> list[str]:
     """The answer in sentences, the most important first."""
-    return findings_of(Results.of(dataset))
+    return findings_of(check_named(Results.of(dataset)))
 
 
 def figures(dataset: xr.Dataset) -> list[Figure]:
     """The figures of the report, the most important first."""
-    return figures_of(Results.of(dataset))
+    return figures_of(check_named(Results.of(dataset)))
 
 
 def answer_of(results: Results) -> list[str]:

@@ -45,15 +45,17 @@ def _write_parquet(path: Path, tables: Iterable[pd.DataFrame]) -> None:
 WRITERS = {".csv": _write_csv, ".parquet": _write_parquet}
 
 
-def export(dataset: xr.Dataset, path: Path | str, results: Sequence[str] = (), *, overwrite: bool = False) -> Path:
+def export(
+    dataset: xr.Dataset, path: Path | str, results: Sequence[str] | str = (), *, overwrite: bool = False
+) -> Path:
     """Write the table of a dataset as a CSV file, or as Parquet, as the command `export` does; its path.
 
-    results: names of those that it has beside the swept numbers and the status, all where none is named. Raises as
-    `write_table`, and BadInput for what is no whole dataset of a study.
+    results: one or some of those that it has beside the swept numbers and the status, all where none is named. Raises
+    as `write_table`, and BadInput for what is no whole dataset of a study.
     """
     found = Results.of(dataset)
     kind_of(found.study)  # which declares its results
-    write_table(found, Path(path), results, overwrite=overwrite)
+    write_table(found, Path(path), [results] if isinstance(results, str) else results, overwrite=overwrite)
     return Path(path)
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from results_schema.arrays import Array
-from studies.results.formatting import Scale, axis_title, spanned, swept_quantity, typed_unit, unit_text
+from studies.results.formatting import Scale, axis_title, spanned, swept_quantity, telling_digits, typed_unit, unit_text
 
 if TYPE_CHECKING:
     from engine.scene import sweep
@@ -79,7 +80,12 @@ class Axis:
         """A value (SI) with its unit, or what it stands for."""
         if self.sets(DIRECTION):
             return direction_in_words(value)
-        return swept_quantity(value, self.units, self.typed)
+        return swept_quantity(value, self.units, self.typed, self.digits)
+
+    @cached_property
+    def digits(self) -> int:
+        """Significant digits of its values, where they are few enough to be told apart."""
+        return 3 if self.dim == VARIANT else telling_digits(self.shown)
 
     @property
     def span(self) -> str:

@@ -10,7 +10,9 @@ from results_schema.lazy_imports import xr
 
 if TYPE_CHECKING:
     from engine.scene.study import Study
+    from studies.results.results import Results
 
+ENDS = ("_max", "_min")  # of results that are variables by their own names
 WHOLE = "give the whole dataset and select from what comes of it, or run a study of these variants alone"
 
 
@@ -63,6 +65,22 @@ def check_whole(dataset: xr.Dataset, study: Study) -> None:
         )
     for cut in _cut(dataset, study):
         raise _part(cut)
+
+
+def check_named(results: Results) -> Results:
+    """The results of one variant a number, as they are. Raises BadInput where one of which there are errors is gone, as
+    by another name: sentences and figures are of all."""
+    dataset = results.dataset
+    told = map(str, dataset["result"].values) if "result" in dataset.coords else ()
+    lost = [name for name in told if name.endswith(ENDS) and name not in dataset]
+    if lost and results.study.output.keeps_variants:
+        raise BadInput(
+            "this dataset has lost a result of its study, or its name",
+            where=lost[0],
+            expected="all results that it has errors of",
+            remedy="rename and drop only in what you draw or write yourself",
+        )
+    return results
 
 
 def _part(cut: str) -> BadInput:

@@ -6,6 +6,10 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
+from results_schema.arrays import Array
+
 if TYPE_CHECKING:
     from engine.scene.study import Study
 
@@ -16,6 +20,8 @@ _PREFIXED = ("m", "N", "N m", "Pa", "J")
 NOISE = 1e-12  # of the largest value beside it: what is smaller is rounding
 ROUNDING = 1e-9  # of the scale of a result: what a long march leaves of what is nothing
 ALIKE = 1e-6  # of the largest value: a smaller range of values is rounding
+APART = 0.05  # of the least distance between swept values: by how much a value that is told may be off
+MOST_TOLD_APART = 1000  # values
 _METRES = (-9, -6, -3, 0)
 
 
@@ -189,9 +195,24 @@ def listed(parts: Sequence[str]) -> str:
     return " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else list(parts))
 
 
-def swept_quantity(value: float, units: str, typed: Scale | None) -> str:
+def swept_quantity(value: float, units: str, typed: Scale | None, digits: int = 3) -> str:
     """A swept number (SI) with its unit: the one in which the study file has it, where it has one."""
-    return quantity(value, units) if typed is None else f"{number(value * typed.factor, 4)} {typed.unit}"
+    if typed is None:
+        return quantity(value, units, digits)
+    return f"{number(value * typed.factor, max(digits, 4))} {typed.unit}"
+
+
+def telling_digits(values: Array) -> int:
+    """Significant digits that tell swept values (n,) from what lies between them; three where five would not do.
+
+    >>> [telling_digits(np.array(values)) for values in ([9.5, 9.55, 9.6], [11.0, 11.25], [1.41421, 1.73205])]
+    [3, 4, 3]
+    """
+    if values.size > MOST_TOLD_APART:
+        return 3
+    apart = APART * np.diff(np.unique(values)).min(initial=np.inf)
+    told = {digits: np.array([float(f"{value:.{digits - 1}e}") for value in values]) for digits in (3, 4, 5)}
+    return next((digits for digits, rounded in told.items() if (np.abs(rounded - values) <= apart).all()), 3)
 
 
 def typed_unit(study: Study, axis: str) -> Scale | None:

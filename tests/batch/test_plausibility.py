@@ -112,7 +112,7 @@ CASES = {
         car=oscillator(1.0, 40.0, WAY, damping=40.0)
     ),
     "the force of carriage car is negative, so that it lifts: weights are positive": passing(car=force(-0.1, WAY)),
-    "settling_band of sensor place, 20 m, is more than a tenth of bed: was a smaller unit meant?": passing(
+    "settling_band of sensor place, 20 m, is more than a hundredth of bed: was a smaller unit meant?": passing(
         car=mass(0.1, STOP), output={"residual": True}, sensor={"place": fixed(0.4) | {"settling_band": 20.0}}
     ),
 }

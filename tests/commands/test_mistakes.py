@@ -61,6 +61,10 @@ MISTAKES = {
         SMALL.replace('kind = "mass"', 'kind = "oscillator"\nstiffness = "2 mN/m"'),
         0, ['carriage.trolley.stiffness = "2 mN/m"', "a thousandth of N; was MN, a million, meant?"],
     ),
+    "a spring by its frequency": (
+        SMALL.replace('kind = "mass"', 'kind = "oscillator"\nstiffness = "1.5 Hz"'),
+        2, ["a frequency (Hz) where a stiffness (N/m) is wanted", "m (2 pi f)^2", "88.8264 N/m for each kg"],
+    ),
     "millipascals": (OTHER.replace("= 1e9", '= "210000 mPa"'), 0, ["mPa is a thousandth of Pa; was MPa"]),
     "distances of axles in mm": (
         SMALL[: SMALL.index("[carriage.trolley]")]

@@ -1,5 +1,8 @@
 """Errors of what a study derives from other results."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -7,7 +10,7 @@ import xarray as xr
 import studies
 from engine.scene.study import Study, load
 from studies.commands import screens
-from studies.findings.amplification import sizes, with_derived_errors
+from studies.findings.amplification import beside, sizes, with_derived_errors
 from studies.findings.contacts import told_uplift
 from studies.protocol.study import kind_of
 from studies.reporting import answers, summary
@@ -202,3 +205,29 @@ def test_contacts_of_many_carriages_are_one_sentence() -> None:
         f"5 carriages keep their contact everywhere; the smallest contact force, that of {lowest}, is "
     )
     assert quantity(least[lowest], "N") in said
+
+
+def test_neighbours_in_a_sweep_are_those_of_its_values_in_order() -> None:
+    """Of values in any order; none at the ends, and where one has no value."""
+    results: Any = SimpleNamespace(dims=("mass", "speed"))
+    axis: Any = SimpleNamespace(dim="speed", values=np.array([3.0, 1.0, 2.0, 4.0]))
+    values = np.array([[0.0, 0.0, 0.0, 0.0], [0.8, 0.5, 1.0, np.nan]])
+    assert beside(results, values, (1, 2), axis).tolist() == [0.5, 0.8]
+    assert all(beside(results, values, (1, entry), axis).size == 0 for entry in (0, 1, 3))
+
+
+def test_the_answer_tells_where_a_peak_between_speeds_may_be_higher() -> None:
+    """Of nine forces on a bridge, whose largest deflection is 5 % larger between four speeds."""
+    train = force(2.0, cruise(0.0, 1.0, 1.0)) | {"axles": 9, "spacing": 0.3}
+
+    def run(speeds: list[float]) -> xr.Dataset:
+        sweep = {"speed": {"of": "train.tram.motion.speed", "values": speeds}}
+        sensor = {"middle": fixed(0.5)}
+        return studies.run(built(beam(damping_ratio=0.01), {}, train={"tram": train}, sensor=sensor, sweep=sweep))
+
+    coarse, fine = run([0.43, 0.4625, 0.4975, 0.53]), run(np.linspace(0.46, 0.52, 61).tolist())
+    assert float(fine["middle_max"].max()) > 1.04 * float(coarse["middle_max"].max())
+    less = 100.0 * (1.0 - float(coarse["middle_max"][3] / coarse["middle_max"][2]))
+    words = f"({less:.0f} % less at a speed beside it: peaks between may be higher)"
+    assert words in " ".join(studies.answer(coarse)) and less > 5.0
+    assert "less at a speed" not in " ".join(studies.answer(fine))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -109,21 +109,24 @@ def _settling(results: Results, sensors: list[str], asked: AskedOfRest) -> list[
         stop = values - settling_of(results, names_of_times(sensor)[0])
         rows.append(Row(sensor, values, errors, "s", label.format, limit, base, best, stop))
         bands.append(f"{sensor.replace('_', ' ')} {quantity(float(known[sensor].settling_band or 0.0), 'm')}")
-    longest, least = (quantity(float(end(rows[0].values)), "s") for end in (np.nanmax, np.nanmin))
+    found = quantity(float((np.nanmin if with_move else np.nanmax)(rows[0].values)), "s")
     caption = (
         f"Time since the {since} until the reading stays within the band of its static value: {listed(bands)}.",
-        f"The shortest is {least}." if with_move else "",
         "Gaps: not settled by the end of the run." if any(np.isnan(row.values).any() for row in rows) else "",
     )
     first = told[0].replace("_", " ")
-    takes = f"move and settling of {first} take" if with_move else f"{first} takes"
-    settles = "" if with_move else " to settle"
-    return _over_sweep(results, "settling", rows, f"{takes} up to {longest}{settles}", caption)
+    if with_move:
+        title = f"move and settling of {first} take at least {found}"
+        return _over_sweep(results, "settling", rows, title, caption, np.nanargmin)
+    return _over_sweep(results, "settling", rows, f"{first} takes up to {found} to settle", caption)
 
 
-def _over_sweep(results: Results, name: str, rows: list[Row], title: str, words: Sequence[str]) -> list[Figure]:
-    """Rows against the swept number that changes those of the first most; none without one."""
-    top = extreme(rows[0].values)
+def _over_sweep(
+    results: Results, name: str, rows: list[Row], title: str, words: Sequence[str], by: Any = np.nanargmax
+) -> list[Figure]:
+    """Rows against the swept number that changes those of the first most, others as where `by` picks one of its values;
+    none without such a number."""
+    top = extreme(rows[0].values, by)
     assert top is not None
     first, *others = [axis.paths for axis in by_effect(results, rows[0].values)] or [()]
     if not first:

@@ -22,6 +22,7 @@ from studies.results.places import Index, spread
 from studies.results.results import Results, statuses
 
 MOST_CURVES = 6
+MOST_TICKS = 5  # of a scale above, whose numbers are long
 FEW = 4  # values of an axis: a curve through them shows nothing in between
 DASHED = (0, (3, 2))
 UNSEEN = 0.01  # of a plot's height: what lies closer is one line to the eye
@@ -245,6 +246,7 @@ def ratio_above(axes: Axes, seen: View, ratio: Any, title: str) -> None:
         there, back = partial(np.multiply, factor), partial(np.multiply, 1.0 / factor)
         above = axes.secondary_xaxis("top", functions=(there, back))
         above.set_xlabel(title)
+        above.locator_params(axis="x", nbins=MOST_TICKS)
 
 
 def per_shown(seen: View, axis: Axis | None, ratio: Any) -> float | None:
