@@ -205,14 +205,15 @@ def swept_quantity(value: float, units: str, typed: Scale | None, digits: int = 
 def telling_digits(values: Array) -> int:
     """Significant digits that tell swept values (n,) from what lies between them; three where five would not do.
 
-    >>> [telling_digits(np.array(values)) for values in ([9.5, 9.55, 9.6], [11.0, 11.25], [1.41421, 1.73205])]
+    >>> [telling_digits(np.array(values)) for values in ([9.5, 9.55, 9.6], [11.0, 11.25], [1.41421, 1.73205, 8.12345])]
     [3, 4, 3]
     """
     if values.size > MOST_TOLD_APART:
         return 3
-    apart = APART * np.diff(np.unique(values)).min(initial=np.inf)
-    told = {digits: np.array([float(f"{value:.{digits - 1}e}") for value in values]) for digits in (3, 4, 5)}
-    return next((digits for digits, rounded in told.items() if (np.abs(rounded - values) <= apart).all()), 3)
+    own = np.unique(values)
+    apart = APART * np.minimum(np.diff(own, prepend=-np.inf), np.diff(own, append=np.inf))  # from the nearer neighbour
+    told = {digits: np.array([float(f"{value:.{digits - 1}e}") for value in own]) for digits in (3, 4, 5)}
+    return next((digits for digits, rounded in told.items() if (np.abs(rounded - own) <= apart).all()), 3)
 
 
 def typed_unit(study: Study, axis: str) -> Scale | None:
