@@ -12,6 +12,7 @@ import xarray as xr
 import engine
 import studies
 from results_schema.errors import BadInput
+from studies.protocol.library import built_in
 from studies.results.results import Results
 from tests.floating.scenes import sliding_mass
 from tests.studies import scenes
@@ -191,3 +192,11 @@ def test_swept_values_are_told_apart() -> None:
     found = scenes.run("passage", 'speed = { of = "carriage.table.motion.speed", values = [11.0, 11.25, 11.5] }')
     (axis,) = Results.of(found).axes
     assert [axis.value(place) for place in range(3)] == ["11 m/s", "11.25 m/s", "11.5 m/s"]
+
+
+def test_built_in_studies_are_run_by_their_names() -> None:
+    """As by the command; a file of such a name has an ending."""
+    found = studies.run("trajectory")
+    assert found.attrs["title"] == engine.load(built_in()["trajectory"]).title
+    with pytest.raises(BadInput, match=r"trajectory\.toml"):
+        studies.run("trajectory.toml")

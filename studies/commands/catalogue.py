@@ -11,9 +11,9 @@ from typing import Any, cast
 
 from results_schema.errors import BadInput
 from results_schema.store.files import is_hdf5
+from studies.protocol.library import LIBRARY, built_in, studies_in
 from studies.protocol.study import KINDS
 
-LIBRARY = Path(__file__).parents[1] / "library"
 STARTS = Path(__file__).parents[1] / "study_templates"
 MEASURED = LIBRARY / "measured.json"  # what `python -m tests.gallery` found of every built-in study
 COMMAND = "#     wanderlast "  # how a line with an example command begins
@@ -29,14 +29,9 @@ class Entry:
     title: str
 
 
-def built_in() -> Mapping[str, Path]:
-    """Files of the built-in studies by name."""
-    return _files(LIBRARY)
-
-
 def starts() -> Mapping[str, Path]:
     """Files to start from by kind of study."""
-    return _files(STARTS)
+    return studies_in(STARTS)
 
 
 def entries() -> Iterator[Entry]:
@@ -137,10 +132,6 @@ def for_file(text: str, kind: str, path: Path) -> str:
 
     lines = text.split("\n")
     return "\n".join(own.sub(named, line) if line.startswith(COMMAND) else line for line in lines)
-
-
-def _files(folder: Path) -> Mapping[str, Path]:
-    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 
 def _nearest(name: str, known: Mapping[str, str]) -> str:

@@ -18,6 +18,7 @@ from results_schema.lazy_imports import xr
 from results_schema.registry import ABSENT, Pieces, by_other_names, lacks, no_row_of
 from results_schema.validate import validate
 from studies.protocol.checksum import VALUES, checksum_of_values
+from studies.protocol.library import by_name
 from studies.protocol.listener import NOBODY, Listener
 from studies.protocol.parts import Foreseen, TextTable, Variants, Work
 from studies.protocol.store import Memory
@@ -280,8 +281,9 @@ def kind_of(study: Study) -> Kind:
 
 
 def run(study: Study | str | Path, **options: Any) -> xr.Dataset:
-    """Run a study, or that of a file, in memory: the dataset of its archive. Raises BadInput; what is allowed and yet
-    often a mistake is a warning, a `Remark`; that kernels are compiled is logged to "wanderlast".
+    """Run a study, that of a file, or the built-in one of a name, in memory: the dataset of its archive. Raises
+    BadInput; what is allowed and yet often a mistake is a warning, a `Remark`; that kernels are compiled is logged to
+    "wanderlast".
 
     options: progress and chunk, and where to run, as of `engine.run`. Meanwhile numpy's linear algebra keeps to one
     thread in the whole process.
@@ -293,7 +295,7 @@ def run(study: Study | str | Path, **options: Any) -> xr.Dataset:
     started = time.perf_counter()
     check_options(options, "progress", "chunk")
     check_chunk(options.get("chunk"))
-    study = study_of(study)
+    study = study_of(by_name(study))
     parts, store = kind_of(study).parts(study), Memory()
     parts.check_memory()
     for remark in parts.remarks:
