@@ -13,8 +13,8 @@ from studies.findings.beyond import MOST_TOLD
 from studies.findings.effects import unchanged
 from studies.results.axes import VARIANT, Axis
 from studies.results.findings_common import in_words, uncertainty
-from studies.results.formatting import ROUNDING, counted, listed, number, quantity
-from studies.results.places import chosen, extreme
+from studies.results.formatting import ALIKE, ROUNDING, counted, listed, number, quantity
+from studies.results.places import Index, chosen, extreme
 from studies.results.results import Results
 
 MOST_GROUPS = 5
@@ -123,7 +123,19 @@ def _kept(results: Results, forces: dict[str, Array]) -> list[str]:
     assert place is not None
     force = f"{quantity(least[lowest], 'N')}{uncertainty(results, f'{lowest}_contact_force_min', place)}"
     smallest = f"the smallest contact force{of} is {force}{in_words(results, place)}"
-    return [*found, f"{who} {keeps} contact everywhere; {smallest}."]
+    return [*found, f"{who} {keeps} contact everywhere; {smallest}{_nearest_to_lifting(results, lowest, place)}."]
+
+
+def _nearest_to_lifting(results: Results, carriage: str, place: Index) -> str:
+    """Where a contact force is the smallest part of a weight that differs over the sweep; "" where that is the place
+    where it is smallest."""
+    forces = results.everywhere(results.dataset[f"{carriage}_contact_force_min"])
+    weights = results.everywhere(weight(results, carriage))
+    part = np.divide(forces, weights, out=np.full(results.shape, np.nan), where=weights > 0.0)
+    least = extreme(-part)
+    if least is None or float(part[least]) >= (1.0 - ALIKE) * float(part[place]):
+        return ""
+    return f"; over the weight it is smallest{in_words(results, least)}: {number(float(part[least]))}"
 
 
 def _doubtful(results: Results, carriage: str, force: Array, off: float) -> str:

@@ -231,3 +231,14 @@ def test_the_answer_tells_where_a_peak_between_speeds_may_be_higher() -> None:
     words = f"({less:.0f} % less at a speed beside it: peaks between may be higher)"
     assert words in " ".join(studies.answer(coarse)) and less > 5.0
     assert "less at a speed" not in " ".join(studies.answer(fine))
+
+
+def test_a_contact_force_is_told_as_a_part_of_the_weight_too_where_masses_differ() -> None:
+    """The lightest mass presses least, the heaviest is nearest to lifting off."""
+    found = scenes.run("passage", 'mass = { of = "carriage.table.mass", values = ["20 kg", "200 kg"] }')
+    force = found.table_contact_force_min.values
+    light, heavy = force / (9.81 * np.array([20.0, 200.0]))
+    assert force[0] < force[1] and heavy < light
+    (told,) = (text for text in studies.answer(found) if "keeps its contact" in text)
+    assert f"the smallest contact force is {quantity(float(force[0]), 'N')}" in told
+    assert told.endswith(f"at mass 20 kg; over the weight it is smallest at mass 200 kg: {heavy:.3g}.")
