@@ -139,17 +139,17 @@ def _effect(axis: Axis, line: Array, error: Array | None = None) -> str:
 
     >>> speed = Axis("speed", "speed", {}, np.array([1.0, 2.0, 4.0]), "m s-1")
     >>> _effect(speed, np.array([1.0, 2.0, 3.2]))
-    'grows 3.2 times over speed 1 m/s to 4 m/s'
+    'grows 3.2 times over speed 1 to 4 m/s'
     >>> _effect(speed, np.array([1.1, 1.0, 1.05]))
-    'changes by up to 10 % over speed 1 m/s to 4 m/s (largest at 1 m/s)'
+    'changes by up to 10 % over speed 1 to 4 m/s (largest at 1 m/s)'
     >>> _effect(speed, np.array([1.0, 0.9, 0.8])), _effect(speed, np.ones(3))
-    ('falls by 20 % over speed 1 m/s to 4 m/s', 'stays the same over speed 1 m/s to 4 m/s')
+    ('falls by 20 % over speed 1 to 4 m/s', 'stays the same over speed 1 to 4 m/s')
     >>> _effect(speed, np.array([5.0, 4.0, 3.2])), _effect(speed, np.array([5.0, 4.0, 2.0]))
-    ('falls by 36 % over speed 1 m/s to 4 m/s', 'falls to 1/2.5 over speed 1 m/s to 4 m/s')
+    ('falls by 36 % over speed 1 to 4 m/s', 'falls to 1/2.5 over speed 1 to 4 m/s')
     >>> _effect(speed, np.array([1.0, 1.0004, 1.0003]))
-    'hardly changes over speed 1 m/s to 4 m/s'
+    'hardly changes over speed 1 to 4 m/s'
     >>> _effect(speed, np.array([1.0, 1.3, 1.2]), np.array([0.2, 0.2, 0.1]))
-    'changes within its estimated error over speed 1 m/s to 4 m/s'
+    'changes within its estimated error over speed 1 to 4 m/s'
     """
     over, ratio = f"over {axis.noun} {axis.span}", float(line.max() / line.min())
     steps = np.diff(line)

@@ -89,8 +89,12 @@ class Axis:
 
     @property
     def span(self) -> str:
-        """Its smallest and largest value, or its one value, with units."""
-        return spanned([self.values.min().item(), self.values.max().item()], self.in_words)
+        """Its smallest and largest value, or its one value, with their unit, once where it is the same."""
+        low, high = (self.in_words(end.item()) for end in (self.values.min(), self.values.max()))
+        if low == high:
+            return low
+        (number, _, unit), same = low.partition(" "), high.partition(" ")[2]
+        return f"{number if unit == same else low} to {high}"
 
     @property
     def range(self) -> str:

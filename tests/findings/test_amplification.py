@@ -65,13 +65,13 @@ def test_no_place_is_told_of_what_is_the_same_everywhere_as_it_is_told() -> None
     gain = dataset["dynamic_amplification"].sel(sensor="midspan")
     dataset["midspan_max"][:], dataset["midspan_min"][:], gain[:] = [1.23e-5, 1.2304e-5], 0.0, [1.3, 1.2]
     (said,) = (one for one in answers.answer(dataset) if one.startswith("midspan"))
-    assert " and hardly changes over mass 50 kg to 100 kg; relative to statics it is largest at mass 50 kg: 1.3" in said
+    assert " and hardly changes over mass 50 to 100 kg; relative to statics it is largest at mass 50 kg: 1.3" in said
     assert "at mass 100 kg" not in said and said.count("hardly changes") == 1
     ends = {f"{one.name} {one.sensor}": screens._where(one) for one in summary.in_tables(Results.of(dataset))}
     assert ends["midspan_max "] == "" and ends["dynamic_amplification midspan"] == "largest at mass 50 kg"
     gain[:] = [1.0001, 1.0]
     (said,) = (one for one in answers.answer(dataset) if one.startswith("midspan"))
-    assert ", as large as the static 12.3 µm, and hardly changes over mass 50 kg to 100 kg." in said
+    assert ", as large as the static 12.3 µm, and hardly changes over mass 50 to 100 kg." in said
     dataset["midspan_max"][:] = [1.23e-5, 1.44e-5]
     (said,) = (one for one in answers.answer(dataset) if one.startswith("midspan"))
     assert ", as large as the static 14.4 µm, at mass 100 kg." in said

@@ -216,9 +216,9 @@ def test_a_sway_before_the_first_mode_that_bends_has_no_theory_of_its_lag() -> N
 @pytest.mark.parametrize(
     ("first", "second", "words"),
     [
-        ([1.0, 1.1, 1.0, 1.1, 1.0, 1.0], [1.0] * 6, "nowhere from 1 m/s to 6 m/s."),
-        ([1.2] * 6, [1.3] * 6, "everywhere from 1 m/s to 6 m/s."),
-        ([1.2] * 6, [1.0] * 6, "everywhere from 1 m/s to 6 m/s (zeta 0.01); nowhere from 1 m/s to 6 m/s (zeta 0.05)."),
+        ([1.0, 1.1, 1.0, 1.1, 1.0, 1.0], [1.0] * 6, "nowhere from 1 to 6 m/s."),
+        ([1.2] * 6, [1.3] * 6, "everywhere from 1 to 6 m/s."),
+        ([1.2] * 6, [1.0] * 6, "everywhere from 1 to 6 m/s (zeta 0.01); nowhere from 1 to 6 m/s (zeta 0.05)."),
         (
             [1.0, 1.2, 1.2, 1.0, 1.0, 1.2],
             [1.0] * 5 + [1.2],
@@ -227,7 +227,7 @@ def test_a_sway_before_the_first_mode_that_bends_has_no_theory_of_its_lag() -> N
         (
             [np.nan, 1.2, 1.0, 1.2, 1.2, 1.2],
             [1.0] * 6,
-            "at 2 m/s and from 4 m/s to the end of the sweep, 6 m/s (zeta 0.01); nowhere from 1 m/s to 6 m/s "
+            "at 2 m/s and from 4 m/s to the end of the sweep, 6 m/s (zeta 0.01); nowhere from 1 to 6 m/s "
             "(zeta 0.05).",
         ),
     ],
@@ -268,7 +268,7 @@ def test_where_a_value_that_is_hardly_known_exceeds_a_limit_is_said_with_its_err
     loose = scenes.with_errors(dataset, 0.2, "shaken_max", "shaken_min")
     wanted = (
         "Its absolute value exceeds 3.4 m/s² at 4 m/s; with its estimated error perhaps from 3 m/s to the end of the "
-        "sweep, 4 m/s, surely nowhere from 1 m/s to 4 m/s."
+        "sweep, 4 m/s, surely nowhere from 1 to 4 m/s."
     )
     assert any(wanted in said for said in answers.answer(loose))
     exact = answers.answer(scenes.with_errors(dataset, 1e-3, "shaken_max", "shaken_min"))

@@ -28,7 +28,7 @@ def test_the_mass_is_told_to_change_the_lag_at_the_lowest_speed_of_samples_too()
         *dataset["lag"].dims
     )
     (said,) = _mass(Results.of(dataset))
-    assert said.startswith("The lag hardly feels the mass: from 50 kg to 100 kg it changes by 0 % at most at ")
+    assert said.startswith("The lag hardly feels the mass: from 50 to 100 kg it changes by 0 % at most at ")
 
 
 def test_lags_beyond_the_speeds_of_the_theory_are_those_of_them_alone() -> None:

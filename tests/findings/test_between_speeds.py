@@ -38,7 +38,7 @@ def test_it_is_said_once_behind_the_first_limit_that_is_exceeded_nowhere() -> No
     told = answer_of(crossed())
     first = next(text for text in told if text.startswith("midspan: "))
     apart = "Speeds stand 0.02 m/s apart; a resonance at 0.5 % damping is about 1 % of its speed wide"
-    assert f"exceeds 100 m nowhere from 1 m/s to 1.04 m/s. {apart}, so peaks between them may be higher: sweep" in first
+    assert f"exceeds 100 m nowhere from 1 to 1.04 m/s. {apart}, so peaks between them may be higher: sweep" in first
     assert "\n".join(told).count("sweep more closely around the highest") == 1
     assert not any("Speeds stand" in text for text in answer_of(crossed(limit=1e-6)))
 

@@ -85,8 +85,8 @@ def test_quantities_with_a_limit_come_first_and_then_their_other_sensors() -> No
 def test_what_comes_near_its_limit_is_told_with_its_largest_value() -> None:
     """3.487 m/s2 at 101 speeds exceeded 3.5 "nowhere", and 3.502 between two of them."""
     near, far = (" ".join(answers.answer(passage(f"[question]\nacceleration = {limit}"))) for limit in (6.05, 20.0))
-    assert "Its absolute value exceeds 6.05 m/s² nowhere from 1 m/s to 8 m/s; at most it is 6 m/s²." in near
-    assert "exceeds 20 m/s² nowhere from 1 m/s to 8 m/s." in far
+    assert "Its absolute value exceeds 6.05 m/s² nowhere from 1 to 8 m/s; at most it is 6 m/s²." in near
+    assert "exceeds 20 m/s² nowhere from 1 to 8 m/s." in far
 
 
 def test_titles_name_the_largest_of_their_quantity() -> None:
@@ -132,7 +132,7 @@ def test_up_to_eight_parts_of_a_sweep_are_listed_with_one_unit(speeds: tuple[int
 def test_what_else_is_swept_stands_with_few_parts_or_once_behind_all() -> None:
     assert beyond(1, 3, masses=(2, 2)) == "at 1 and 3 km/h (mass 70 kg)"
     assert beyond(1, 3, masses=(2, 3)) == "at 1 km/h (mass 70 kg) and at 3 km/h (mass 80 kg)"
-    assert beyond(1, 3, 5, 7, masses=(2, 2, 1, 2)) == "at 1, 3, 5 and 7 km/h (mass 60 kg to 70 kg, not throughout)"
+    assert beyond(1, 3, 5, 7, masses=(2, 2, 1, 2)) == "at 1, 3, 5 and 7 km/h (mass 60 to 70 kg, not throughout)"
 
 
 def part_of(values: str, exceeded: list[list[bool]]) -> str:
@@ -147,7 +147,7 @@ def test_not_every_combination_is_told() -> None:
     none, some, full = [False] * 5, [True, True, False, False, False], [True] * 5
     three = "values = [1, 2, 3]"
     assert part_of(three, [none, some, full]) == "from 2 m/s to the end of the sweep, 3 m/s (not with every mass)"
-    assert part_of(three, [some, some, full]) == "everywhere from 1 m/s to 3 m/s (not with every mass)"
+    assert part_of(three, [some, some, full]) == "everywhere from 1 to 3 m/s (not with every mass)"
     assert part_of(three, [none, full, full]) == "from 2 m/s to the end of the sweep, 3 m/s"
 
 
@@ -167,11 +167,11 @@ def test_of_samples_the_part_of_the_variants_is_told_at_few_values_of_another_nu
     results = Results.of(scenes.run("passage", f"{pace}\n{mass}"))
     speed = next(axis for axis in results.axes if axis.name == "speed")
     own = results.everywhere(results.dataset["speed"])
-    for beside, words in ((7, "at 5 m/s in 30 % and at 10 m/s in 0 % of the variants"), (0, "everywhere from 5 m/s")):
+    for beside, words in ((7, "at 5 m/s in 30 % and at 10 m/s in 0 % of the variants"), (0, "everywhere from 5 to 10 m/s")):
         values = np.where(own == 10.0, float(beside == 0), 1.0)
         values[(own == 5.0) & (np.cumsum(own == 5.0).reshape(own.shape) <= beside)] = 0.0
         assert where_beyond(results, values, 0.5, speed).startswith(words)
-    assert where_beyond(results, np.zeros(results.shape), 0.5, speed).startswith("nowhere from 5 m/s")
+    assert where_beyond(results, np.zeros(results.shape), 0.5, speed).startswith("nowhere from 5 to 10 m/s")
 
 
 def test_of_samples_that_are_told_loosely_both_parts_are_told() -> None:

@@ -73,7 +73,7 @@ def test_each_number_is_told_by_itself() -> None:
     results = Results.of(scenes.run("passage", f"{crawl}\n{MASS}\n{DEAD}", extra=ELSEWHERE))
     said = told_effects(results, sizes(results, "midspan"), "it")
     assert said.startswith("Over all else that is swept, it ")
-    assert "grows 4 times over mass 50 kg to 200 kg" in said and "stays the same over place 1 m to 2 m" in said
+    assert "grows 4 times over mass 50 to 200 kg" in said and "stays the same over place 1 to 2 m" in said
     assert answers.answer(results.dataset)[0].endswith(told_effects(results, sizes(results, "midspan"), IT))
 
 
@@ -84,8 +84,8 @@ def test_the_largest_over_all_others_counts() -> None:
     values[3] = 2.0, 5.0, 4.0  # masses 200, 50 and 100 kg
     said = told_effects(results, values, "it")
     assert said == (
-        "Over all else that is swept, it grows 5 times over pace 1 m/s to 8 m/s and "
-        "falls to 1/2.5 over mass 50 kg to 200 kg."
+        "Over all else that is swept, it grows 5 times over pace 1 to 8 m/s and "
+        "falls to 1/2.5 over mass 50 to 200 kg."
     )
     values[0] = 5.0, 0.0, 0.0
     assert "changes by up to 25 % over mass" in told_effects(results, values, "it")
@@ -115,7 +115,7 @@ def test_a_number_at_which_all_is_zero_is_not_compared() -> None:
     values = np.outer(np.ones(4), [2.0, 0.0, 1.0])
     assert (
         told_effects(results, values, "it")
-        == "Over all else that is swept, it stays the same over pace 1 m/s to 8 m/s."
+        == "Over all else that is swept, it stays the same over pace 1 to 8 m/s."
     )
 
 
@@ -131,10 +131,10 @@ def test_one_number_or_a_sample_has_no_effects_of_its_own() -> None:
 def test_what_nothing_changes_is_said_so() -> None:
     dataset = scenes.run("passage", DEAD, extra=ELSEWHERE)
     results = Results.of(dataset)
-    assert unchanged(results, sizes(results, "midspan")) == "does not change over place 1 m to 2 m"
+    assert unchanged(results, sizes(results, "midspan")) == "does not change over place 1 to 2 m"
     assert unchanged(results, sizes(results, "dead")) == ""
     told = next(text for text in answers.answer(dataset) if text.startswith("midspan:"))
-    assert told.count("does not change over place 1 m to 2 m") == 1 and " at place " not in told
+    assert told.count("does not change over place 1 to 2 m") == 1 and " at place " not in told
 
 
 def test_what_nothing_changes_is_not_drawn() -> None:

@@ -374,7 +374,7 @@ def test_a_limit_is_told_with_where_it_is_exceeded() -> None:
     most = np.maximum(abs(found["tip_max"]), abs(found["tip_min"])).values
     assert (np.diff(most) > 0.0).all()
     assert "tip: the displacement goes from " in kind_of(study).findings(Results.of(found))[0]
-    assert "exceeds 10 m nowhere from 0.25 rad/s to 1 rad/s" in kind_of(study).findings(Results.of(found))[0]
+    assert "exceeds 10 m nowhere from 0.25 to 1 rad/s" in kind_of(study).findings(Results.of(found))[0]
     limit = float(np.round(0.5 * (most[0] + most[1]), 3))
     found = studies.run(study.with_values({"question.displacement": limit}))
     told = kind_of(study).findings(Results.of(found))

@@ -184,7 +184,7 @@ def test_numbers_of_peaks_that_one_swept_number_does_not_change_are_steps_along_
     dataset.peaks_per_cycle[:] = xr.where(dataset.mass > 60.0, 2, 1)
     figure = drawn(dataset)["peaks-midspan"]
     assert figure.title == "midspan has 1 peak per cycle up to 50 kg; beyond, 2"
-    assert "The same for pace 0.005 Hz to 0.02 Hz." in figure.caption and len(figure.drawing.axes) == 1
+    assert "The same for pace 0.005 to 0.02 Hz." in figure.caption and len(figure.drawing.axes) == 1
 
 
 def test_odd_harmonics_are_drawn_where_they_are_largest() -> None:

@@ -112,6 +112,6 @@ def test_level_lines_are_a_sentence() -> None:
         if is_drawn:  # without a place, which would be that of the last digits
             title = "The largest displacement at 5 m of bed is 7.7 mm, within the limit of 8 mm"
             assert found["largest-displacement"].title == title
-        words = "Not drawn: midspan, 7.7 mm, the same within 1 % for pace 1 m/s to 8 m/s."
+        words = "Not drawn: midspan, 7.7 mm, the same within 1 % for pace 1 to 8 m/s."
         words += " Dynamic amplification of midspan: 1 throughout."
         assert any(words in figure.caption for figure in found.values()) != is_drawn
