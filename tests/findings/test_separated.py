@@ -107,7 +107,7 @@ def test_bodies_in_moving_frames_count_while_the_contact_holds() -> None:
     results.dataset["status"].values[:] = Status.OK
     held = Results.of(results.dataset)
     assert "contact holds" not in "\n".join([*sliding(held), *others(held, 0.5)])
-    assert list(sliding(held))[1].startswith("Its contact force goes from -9 to 9 kN")
+    assert list(sliding(held))[1].startswith("Its contact force goes from -9 kN to 9 kN")
 
 
 @pytest.mark.parametrize("reason", ["lift off", "over an end of its track"])
