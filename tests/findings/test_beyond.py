@@ -167,7 +167,8 @@ def test_of_samples_the_part_of_the_variants_is_told_at_few_values_of_another_nu
     results = Results.of(scenes.run("passage", f"{pace}\n{mass}"))
     speed = next(axis for axis in results.axes if axis.name == "speed")
     own = results.everywhere(results.dataset["speed"])
-    for beside, words in ((7, "at 5 m/s in 30 % and at 10 m/s in 0 % of the variants"), (0, "everywhere from 5 to 10 m/s")):
+    some = "at 5 m/s in 30 % and at 10 m/s in 0 % of the variants"
+    for beside, words in ((7, some), (0, "everywhere from 5 to 10 m/s")):
         values = np.where(own == 10.0, float(beside == 0), 1.0)
         values[(own == 5.0) & (np.cumsum(own == 5.0).reshape(own.shape) <= beside)] = 0.0
         assert where_beyond(results, values, 0.5, speed).startswith(words)
