@@ -227,8 +227,7 @@ def test_a_sway_before_the_first_mode_that_bends_has_no_theory_of_its_lag() -> N
         (
             [np.nan, 1.2, 1.0, 1.2, 1.2, 1.2],
             [1.0] * 6,
-            "at 2 m/s and from 4 m/s to the end of the sweep, 6 m/s (zeta 0.01); nowhere from 1 to 6 m/s "
-            "(zeta 0.05).",
+            "at 2 m/s and from 4 m/s to the end of the sweep, 6 m/s (zeta 0.01); nowhere from 1 to 6 m/s (zeta 0.05).",
         ),
     ],
 )
