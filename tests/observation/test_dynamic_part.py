@@ -123,7 +123,7 @@ def test_answers_tell_it_beside_statics_and_judge_it_by_a_limit_of_its_own() -> 
     assert (part / whole).values == pytest.approx((largest / found.place_max).values)
     assert 'part = "dynamic"' not in told
     alone = studies.run(SLOW.with_values({"sensor": {"place": fixed(0.5)}, "question": {}}))
-    hint = 'nowhere from 0.05 m/s to 0.2 m/s. It compares largest values; a sensor with part = "dynamic" reads'
+    hint = 'nowhere from 0.05 to 0.2 m/s. It compares largest values; a sensor with part = "dynamic" reads'
     assert hint in " ".join(studies.answer(alone))
 
 
