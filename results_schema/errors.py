@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from difflib import get_close_matches
 from pathlib import Path
 
 
@@ -100,6 +101,17 @@ def printable(text: str, limit: int) -> str:
     """Text on one line of bounded length; control characters, which a terminal would obey, as escapes."""
     text = text if len(text) <= limit else f"{text[: limit - 3]}..."
     return text if text.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """A hint at the known name that is most like a word, or at what a mapping has of it; "" for none.
+
+    >>> did_you_mean("lenght", ["length", "area"]), did_you_mean("crain", {"crane": "crane.nc"}), did_you_mean("a", [])
+    ('did you mean "length"?', 'did you mean "crane.nc"?', '')
+    """
+    meant = known if isinstance(known, Mapping) else {name: name for name in known}
+    near = get_close_matches(word[:100], list(meant), n=1)
+    return f'did you mean "{meant[near[0]]}"?' if near else ""
 
 
 def shortened(value: object, limit: int = 60) -> str:

@@ -12,6 +12,7 @@ import xarray as xr
 import engine
 import studies
 from results_schema.errors import BadInput
+from studies.findings.beyond import where_beyond
 from studies.protocol.library import built_in
 from studies.results.results import Results
 from tests.floating.scenes import sliding_mass
@@ -192,6 +193,8 @@ def test_swept_values_are_told_apart() -> None:
     found = scenes.run("passage", 'speed = { of = "carriage.table.motion.speed", values = [11.0, 11.25, 11.5] }')
     (axis,) = Results.of(found).axes
     assert [axis.value(place) for place in range(3)] == ["11 m/s", "11.25 m/s", "11.5 m/s"]
+    beyond = where_beyond(Results.of(found), np.array([0.0, 1.0, 0.0]), 0.5, axis)
+    assert beyond == "at 11.25 m/s"  # as by itself, where nothing is beside it
 
 
 def test_built_in_studies_are_run_by_their_names() -> None:

@@ -19,7 +19,7 @@ from results_schema.arrays import Array
 IN_A_ROW = 3  # axles: two excite little more than one
 RINGS = 5.0  # first periods after a train: of two spans 3.4 m/s2 were seen after one of them, 3.9 after five
 SHORT = 0.5  # of the length of the body: a way of a load that passes; cranes' are nine tenths of theirs
-WIDE = 0.01  # of the length: a band within which everything has settled
+WIDE = 0.01  # of the length: a band of settling; cranes sag by a 500th at most, all of which lies within
 SLOW = 0.1  # Hz, of a mass on its spring: vehicles swing at 0.5 to 20 Hz, and at a thirtieth of that on N/m for kN/m
 FARTHEST = 100.0  # m from axle to axle: those of the longest wagons stand 20 m apart
 _THOUSANDTHS = re.compile(r"(?<=[\d ./*])m(?:Pa\b|N\b(?=\s*\S))")  # of pascals, and of what loads are not

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar, get_args
 
@@ -24,7 +23,7 @@ from pydantic_core import CoreSchema, InitErrorDetails, core_schema
 
 from engine.study_file.document import Beside
 from engine.study_file.units import fault
-from results_schema.errors import shortened
+from results_schema.errors import did_you_mean, shortened
 from results_schema.registry import ABSENT, Pieces, by_other_names, unfinished
 
 NUMBER, WORD, LIST, TABLE = "<number>", "<word>", "<list>", "<table>"
@@ -227,8 +226,7 @@ def nearest(word: object, names: Sequence[str]) -> str:
     """
     if meant := synonym(word, names):
         return meant
-    found = get_close_matches(str(word)[:100], list(names), n=1, cutoff=0.6)
-    return f'did you mean "{found[0]}"?' if found else ""
+    return did_you_mean(str(word), names)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from results_schema.blocks import CHUNK_BYTES, IN_MEMORY
-from results_schema.errors import ArchiveError, BadInput, WanderlastError
+from results_schema.errors import ArchiveError, BadInput, WanderlastError, did_you_mean
 from results_schema.lazy_imports import xr
 from results_schema.store import files
 from results_schema.store.links import refuse_pointers
@@ -102,9 +101,8 @@ def _as_archive_error(path: Path) -> Iterator[None]:
 
 def _check_signature(path: Path) -> None:
     if not path.exists():
-        others = (own.stem for own in path.parent.glob("*.nc"))  # all have the same ending
-        near = get_close_matches(path.name.removesuffix(".nc"), others, 1)
-        remedy = f'did you mean "{path.with_name(near[0])}.nc"?' if near else ""
+        alike = {own.stem: str(own) for own in path.parent.glob("*.nc")}  # all have the same ending
+        remedy = did_you_mean(path.name.removesuffix(".nc"), alike)
         raise BadInput("no such file", where=str(path), remedy=remedy)
     if not path.is_file():
         raise BadInput("not a file", where=str(path), expected="an archive (.nc)")

@@ -5,11 +5,10 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, cast
 
-from results_schema.errors import BadInput
+from results_schema.errors import BadInput, did_you_mean
 from results_schema.store.files import is_hdf5
 from studies.protocol.library import LIBRARY, built_in, studies_in
 from studies.protocol.study import KINDS
@@ -62,7 +61,7 @@ def find_study(study: str) -> Path:
     if path.is_file():
         return path
     alike = {file.stem: str(file) for file in sorted(path.parent.glob("*.toml"))}  # all have the same ending
-    near = _nearest(path.stem, {name: name for name in known} | alike)
+    near = did_you_mean(path.stem, {name: name for name in known} | alike)
     if path.is_dir():
         raise BadInput("this is a folder", where=study, expected="a study file (TOML)", remedy=near)
     if path.suffix or len(path.parts) > 1:
@@ -113,7 +112,7 @@ def start_text(kind: str) -> str:
         return built_in()[kind].read_text(encoding="utf-8")
     if kind not in KINDS.foreign:
         what, names = "no such kind of study, or none with a file to start from", [*known, *KINDS.foreign]
-        remedy = _nearest(kind, {name: name for name in known})
+        remedy = did_you_mean(kind, known)
         raise BadInput(what, where=kind, expected=f"one of {', '.join(names)}", remedy=remedy)
     return str(cast(Any, KINDS[kind]).start) + shared
 
@@ -132,9 +131,3 @@ def for_file(text: str, kind: str, path: Path) -> str:
 
     lines = text.split("\n")
     return "\n".join(own.sub(named, line) if line.startswith(COMMAND) else line for line in lines)
-
-
-def _nearest(name: str, known: Mapping[str, str]) -> str:
-    """A hint at what is known by the name that is most like this one, or ""."""
-    near = get_close_matches(name, list(known), n=1)
-    return f'did you mean "{known[near[0]]}"?' if near else ""

@@ -27,7 +27,7 @@ from results_schema.arrays import Array
 from studies.commands import planned_numerics as chosen
 from studies.commands.forecast import AROUND, Forecast, forecast
 from studies.commands.sampled import sampled
-from studies.findings.in_step import WITH_MASSES, speeds_in_step
+from studies.findings.in_step import WITH_MASSES, masses_ride, speeds_in_step
 from studies.protocol.parts import Foreseen, Pieces, TextTable, Variants
 from studies.results.axes import Axis
 from studies.results.findings_common import has_dampers, told_trains
@@ -272,7 +272,7 @@ def _sweep(study: Study, cases: Cases) -> TextTable:
         (
             axis.name,
             str(len(axis.values)),
-            Axis.of_scene(study, axis).range,
+            Axis.of_scene(study, axis).span,
             ", ".join(axis.of),
         )
         for axis in cases.axes
@@ -313,7 +313,7 @@ def _in_step(plan: Plan) -> Iterator[TextTable]:
             for one in found
         ]
         heading = f"Speeds at which axles of {name} push in step with a frequency of {train.on}"
-        heading += WITH_MASSES * (train.unsprung_mass > 0.0)
+        heading += WITH_MASSES * masses_ride(study, name)
         yield TextTable(
             heading, ("speed", "frequency", "way in a period", "part of its load", "swing of its mode"), rows
         )

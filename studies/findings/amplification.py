@@ -52,12 +52,10 @@ def largest(results: Results, values: Array) -> Index | None:
 def beside(results: Results, values: Array, place: Index, axis: Axis) -> Array:
     """What the two neighbours of a place of the sweep along an axis have of values; nothing at an end of the sweep, and
     where one of them has none."""
-    along = results.dims.index(axis.dim)
-    line = values[tuple(slice(None) if n == along else entry for n, entry in enumerate(place))]
-    order = np.argsort(axis.values)
-    at = int(np.flatnonzero(order == place[along])[0])
-    near = line[order[[at - 1, at + 1]]] if 0 < at < order.size - 1 else np.array([np.nan])
-    return near if np.isfinite(near).all() else near[:0]
+    value = axis.values[place[results.dims.index(axis.dim)]]
+    at = int(np.searchsorted(np.sort(axis.values), value))
+    near = results.along(axis, values, place)[at - 1 : at + 2 : 2] if at else values[:0]
+    return near if near.size == 2 and np.isfinite(near).all() else near[:0]
 
 
 def told_amplification(results: Results, sensor: str) -> Array:

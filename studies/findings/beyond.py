@@ -1,7 +1,6 @@
 """Where in a sweep values are beyond a limit, and the limits of sensors that a table [question] may name."""
 
 from collections.abc import Collection, Mapping
-from dataclasses import replace
 from typing import Annotated, cast
 
 import numpy as np
@@ -286,18 +285,10 @@ def _at(axis: Axis, parts: list[Array], end: float) -> str:
     'at 1 and 3 to 4 m/s, and from 7 m/s to the end of the sweep, 9 m/s'
     """
     closed = [part for part in parts if part.size == 1 or part[-1] != end]
-    told = [f"at {_in_one_unit(axis, closed)}"] if closed else []
+    told = [f"at {axis.spans(closed)}"] if closed else []
     if len(closed) < len(parts):
         told.append(f"from {axis.in_words(float(parts[-1][0]))} to the end of the sweep, {axis.in_words(end)}")
     return (", and " if len(closed) > 1 else " and ").join(told)
-
-
-def _in_one_unit(axis: Axis, parts: list[Array]) -> str:
-    """Parts with their unit behind the last alone, where it is that of all."""
-    ends = [[axis.in_words(float(part[place])) for place in (0, -1)] for part in parts]
-    units = {word.partition(" ")[2] for words in ends for word in words}
-    unit = f" {units.pop()}" if units != {""} and len(units) == 1 else ""
-    return listed([" to ".join(dict.fromkeys(word.removesuffix(unit) for word in words)) for words in ends]) + unit
 
 
 def _common(results: Results, along: Axis, which: Mask) -> str:
@@ -322,4 +313,4 @@ def _spans(axis: Axis, own: Array) -> str:
     """Some ascending values of a swept number: from the first to the last, but for one or two that lie between."""
     places = np.searchsorted(np.unique(axis.values), own)
     parts = np.split(own, np.flatnonzero(np.diff(places) > 1) + 1)
-    return _in_one_unit(axis, parts) if 1 < len(parts) <= MOST_APART else replace(axis, values=own).span
+    return axis.spans(parts if len(parts) <= MOST_APART else [own])

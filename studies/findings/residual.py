@@ -164,8 +164,7 @@ def _told_between(results: Results, values: Array, place: Index) -> str:
     another; place: of the largest, through which each swept number is followed. "" where none does that."""
     axes = [axis for axis in by_effect(results, values) if axis.dim != VARIANT]
     for axis in axes:
-        along = results.dims.index(axis.dim)
-        line = values[tuple(slice(None) if n == along else at for n, at in enumerate(place))][np.argsort(axis.values)]
+        line = results.along(axis, values, place)
         steps = np.diff(line[-LAST:])
         steps = np.sign(steps[np.abs(steps) > LEAST_STEP * np.nanmax(line)])
         turns = np.count_nonzero(np.diff(steps))

@@ -27,5 +27,4 @@ def by_name(study: T) -> T | Path:
     >>> by_name("asymmetry").name, by_name("my.toml")
     ('asymmetry.toml', 'my.toml')
     """
-    path = LIBRARY / f"{study}.toml"
-    return path if isinstance(study, str) and study.replace("-", "").isalpha() and path.is_file() else study
+    return built_in().get(study, study) if isinstance(study, str) else study

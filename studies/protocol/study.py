@@ -7,13 +7,12 @@ import time
 import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from difflib import get_close_matches
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from results_schema.errors import BadInput, Remark
+from results_schema.errors import BadInput, Remark, did_you_mean
 from results_schema.lazy_imports import xr
 from results_schema.registry import ABSENT, Pieces, by_other_names, lacks, no_row_of
 from results_schema.validate import validate
@@ -258,8 +257,7 @@ def kind_named(name: str, where: str = "kind") -> Kind:
     """The kind of that name; its results are declared from then on. Raises BadInput for an unknown one."""
     if name not in KINDS:
         known = kind_names()
-        near = [MEANT[name]] if name in MEANT else get_close_matches(name, known, n=1)
-        remedy = f'did you mean "{near[0]}"?' if near else ABSENT
+        remedy = did_you_mean(name, {one: one for one in known} | MEANT) or ABSENT
         expected = f"one of {', '.join(known)}"
         raise BadInput("unknown kind of study", where=where, expected=expected, received=repr(name), remedy=remedy)
     return KINDS[name]

@@ -4,7 +4,6 @@ Parquet."""
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from difflib import get_close_matches
 from functools import partial
 from itertools import chain, product
 from math import prod
@@ -14,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from results_schema.errors import BadInput
+from results_schema.errors import BadInput, did_you_mean
 from results_schema.lazy_imports import xr
 from results_schema.store import files
 from studies.protocol.study import kind_of
@@ -135,8 +134,7 @@ def _chosen(results: Results, names: Sequence[str]) -> xr.Dataset:
     known = [str(name) for name in (*dataset.data_vars, *dataset.coords) if name not in dataset.dims]
     for name in names:
         if name not in known:
-            near = get_close_matches(name, known, n=1)
-            remedy = f'did you mean "{near[0]}"?' if near else ""
+            remedy = did_you_mean(name, known)
             expected = f"one of {len(known)} results, which info --all lists"
             raise BadInput("no such result", where="results", expected=expected, received=name, remedy=remedy)
     kept = {*names, *(axis.name for axis in results.axes), *dataset.dims, "status"}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from results_schema.arrays import Array
-from studies.results.formatting import Scale, axis_title, spanned, swept_quantity, telling_digits, typed_unit, unit_text
+from studies.results.formatting import Scale, axis_title, listed, swept_quantity, telling_digits, typed_unit
 
 if TYPE_CHECKING:
     from engine.scene import sweep
@@ -89,19 +89,16 @@ class Axis:
 
     @property
     def span(self) -> str:
-        """Its smallest and largest value, or its one value, with their unit, once where it is the same."""
-        low, high = (self.in_words(end.item()) for end in (self.values.min(), self.values.max()))
-        if low == high:
-            return low
-        (number, _, unit), same = low.partition(" "), high.partition(" ")[2]
-        return f"{number if unit == same else low} to {high}"
+        """Its smallest and largest value, or its one value, with their unit."""
+        return self.spans([np.sort(self.values)])
 
-    @property
-    def range(self) -> str:
-        """The same with the unit once, for tables."""
-        if self.sets(DIRECTION):
-            return self.span
-        return f"{spanned(self.shown)} {self.typed.unit if self.typed else unit_text(self.units)}".strip()
+    def spans(self, parts: Sequence[Array]) -> str:
+        """From the first to the last of each of some parts of its values, with their unit behind the last alone, where
+        it is that of all."""
+        ends = [[self.in_words(float(part[place])) for place in (0, -1)] for part in parts]
+        units = {word.partition(" ")[2] for words in ends for word in words}
+        unit = f" {units.pop()}" if units != {""} and len(units) == 1 else ""
+        return listed([" to ".join(dict.fromkeys(word.removesuffix(unit) for word in words)) for words in ends]) + unit
 
     def value(self, index: int) -> str:
         """One value with its unit."""

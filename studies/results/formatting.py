@@ -20,8 +20,8 @@ _PREFIXED = ("m", "N", "N m", "Pa", "J")
 NOISE = 1e-12  # of the largest value beside it: what is smaller is rounding
 ROUNDING = 1e-9  # of the scale of a result: what a long march leaves of what is nothing
 ALIKE = 1e-6  # of the largest value: a smaller range of values is rounding
-APART = 0.05  # of the least distance between swept values: by how much a value that is told may be off
-MOST_TOLD_APART = 1000  # values
+APART = 0.05  # of the distance to the next swept value: by how much one that is told may be off
+MOST_TOLD_APART = 1000  # swept values: of more, as of random draws, the next is beyond the digits that people read
 _METRES = (-9, -6, -3, 0)
 
 

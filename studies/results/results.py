@@ -9,6 +9,7 @@ from textwrap import wrap
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from results_schema.arrays import Array, Mask
 from results_schema.lazy_imports import xr
@@ -230,6 +231,11 @@ class Results:
         own = xr.as_variable(values)  # without coordinates, of which xarray would make copies
         found = np.asarray(own.transpose(*(dim for dim in self.dims if dim in own.dims)).values, dtype=np.float64)
         return np.broadcast_to(found.reshape([own.sizes.get(dim, 1) for dim in self.dims]), self.shape)
+
+    def along(self, axis: Axis, values: NDArray[Any], place: Index) -> NDArray[Any]:
+        """(n,) values (in the sweep's shape) along a swept number, through a place of the sweep; ascending with it."""
+        own = (slice(None) if dim == axis.dim else entry for dim, entry in zip(self.dims, place, strict=True))
+        return np.asarray(values[tuple(own)][np.argsort(axis.values)])
 
     def deciding_axis(self, variable: str, sensor: str) -> Axis | None:
         """The axis, other than the pace of the motion, along which a result changes most; the mass in doubt."""

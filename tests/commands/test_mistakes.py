@@ -24,6 +24,14 @@ def moved(keys: str) -> str:
     return SMALL.replace('"cruise"', '"point-to-point"').replace("speed = 5.0 }", f"speed = 5.0, {limits} }}")
 
 
+def trained(keys: str) -> str:
+    """The study with a train that has these keys in place of the carriage and what is swept."""
+    train = f'[train.ice]\nkind = "force"\non = "beam"\nforce = 1.0\n{keys}\n'
+    motion = 'motion = { kind = "cruise", start = 0.0, end = 1.0, speed = 5.0 }\n'
+    sensor = '[sensor.middle]\nbody = "beam"\nat = 0.5\n'
+    return SMALL[: SMALL.index("[carriage.trolley]")] + train + motion + sensor
+
+
 # what was written instead of what -> exit code, words
 MISTAKES = {
     "a swept scheme": (axis('scheme = { of = "solver.scheme", values = ["auto"] }'), 2, ["word cannot be swept"]),
@@ -67,10 +75,7 @@ MISTAKES = {
     ),
     "millipascals": (OTHER.replace("= 1e9", '= "210000 mPa"'), 0, ["mPa is a thousandth of Pa; was MPa"]),
     "distances of axles in mm": (
-        SMALL[: SMALL.index("[carriage.trolley]")]
-        + '[train.ice]\nkind = "force"\non = "beam"\nforce = 1.0\nspacing = [2500, 15000, 2500]\n'
-        + 'motion = { kind = "cruise", start = 0.0, end = 1.0, speed = 5.0 }\n'
-        + '[sensor.middle]\nbody = "beam"\nat = 0.5\n',
+        trained("spacing = [2500, 15000, 2500]"),
         0, ["axles of train ice stand up to 15000 m apart, 20000 m in all: were millimetres meant?"],
     ),
     "a length in mm that is in m": (
@@ -123,15 +128,11 @@ MISTAKES = {
     ),
     "a decimal comma in quotes": (SMALL.replace("length = 1.0", 'length = "2,5 m"'), 2, ["decimal comma", '"2.5 m"']),
     "a sensor under a train": (
-        SMALL[: SMALL.index("[carriage.trolley]")]
-        + '[train.ice]\nkind = "force"\non = "beam"\nforce = 1.0\naxles = 3\nspacing = 0.1\n'
-        + 'motion = { kind = "cruise", start = 0.0, end = 1.0, speed = 5.0 }\n[sensor.under]\nunder = "ice"\n',
+        trained("axles = 3\nspacing = 0.1") + '[sensor.under]\nunder = "ice"\n',
         2, ["sensor.under.under: no such carriage", 'one of its axles: "ice_1" is in front'],
     ),
     "a key of a train's motion": (
-        SMALL[: SMALL.index("[carriage.trolley]")]
-        + '[train.ice]\nkind = "force"\non = "beam"\nforce = 1.0\naxles = 3\nspacing = 0.1\nspeed = 5.0\n'
-        + 'motion = { kind = "cruise", start = 0.0, end = 1.0 }\n[sensor.middle]\nbody = "beam"\nat = 0.5\n',
+        trained("axles = 3\nspacing = 0.1\nspeed = 5.0").replace("1.0, speed = 5.0 }", "1.0 }"),
         2, ["a key of its motion: motion.speed"],
     ),
     "a comma that may part thousands": (

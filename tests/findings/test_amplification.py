@@ -1,8 +1,5 @@
 """Errors of what a study derives from other results."""
 
-from types import SimpleNamespace
-from typing import Any
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -209,8 +206,11 @@ def test_contacts_of_many_carriages_are_one_sentence() -> None:
 
 def test_neighbours_in_a_sweep_are_those_of_its_values_in_order() -> None:
     """Of values in any order; none at the ends, and where one has no value."""
-    results: Any = SimpleNamespace(dims=("mass", "speed"))
-    axis: Any = SimpleNamespace(dim="speed", values=np.array([3.0, 1.0, 2.0, 4.0]))
+    sweep = 'mass = { of = "carriage.table.mass", values = [50, 100] }\n'
+    sweep += 'speed = { of = "carriage.table.motion.speed", values = [3, 1, 2, 4] }'
+    results = Results.of(scenes.run("passage", sweep))
+    axis = next(axis for axis in results.axes if axis.name == "speed")
+    assert results.dims == ("mass", "speed")
     values = np.array([[0.0, 0.0, 0.0, 0.0], [0.8, 0.5, 1.0, np.nan]])
     assert beside(results, values, (1, 2), axis).tolist() == [0.5, 0.8]
     assert all(beside(results, values, (1, entry), axis).size == 0 for entry in (0, 1, 3))

@@ -244,6 +244,14 @@ def test_distances_and_bodies_are_those_of_the_largest_value() -> None:
         assert told.startswith("Axles of tram push in step with a frequency of bed (1.26 Hz) most strongly at 0.39")
 
 
+def test_masses_that_only_press_do_not_slow_the_body_down() -> None:
+    """Where the study computes them as forces."""
+    as_forces = sentence(
+        train={"tram": MASSES}, sweep=speeds_of_tram(0.3, 0.6), solver={"tolerance": 1e-2, "fidelity": "force"}
+    )
+    assert "frequency of bed (1.57 Hz) most strongly at 0.488" in as_forces
+
+
 def test_what_hardly_swings_the_bridge_is_not_told() -> None:
     """The third mode, whose swing is a hundredth of what wagons so close deflect the bridge."""
     assert not sentence(train={"tram": FORCES | {"spacing": 0.15}}, sweep=speeds_of_tram(0.3, 0.6))

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure as Drawing
 
 from studies.findings.amplification import largest, size_errors, sizes, told_amplification
 from studies.findings.effects import HARDLY, hardly_changed
-from studies.findings.in_step import WITH_MASSES, InStep, trains_in_step
+from studies.findings.in_step import WITH_MASSES, InStep, masses_ride, trains_in_step
 from studies.pictures.common.figures import FLAT, INK, Figure, draw, limit_far, limit_line, telling_limits
 from studies.pictures.common.sweep_view import UNSEEN, Curve, View, along_axis, draw_curves, one_legend, ratio_above
 from studies.results.findings_common import LOOSE, in_words, told_hanging
@@ -208,8 +208,8 @@ def _told_in_step(seen: View) -> str:
 
 
 def _rides(seen: View) -> bool:
-    """Whether masses of a train move with its body."""
-    return any(train.unsprung_mass > 0.0 for train in seen.results.study.train.values())
+    """Whether masses of a train that is marked move with its body."""
+    return any(masses_ride(seen.results.study, name) for _, name, _ in _in_step(seen))
 
 
 def _in_step(seen: View) -> list[tuple[float, str, InStep]]:

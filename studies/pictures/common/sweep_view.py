@@ -22,7 +22,7 @@ from studies.results.places import Index, spread
 from studies.results.results import Results, statuses
 
 MOST_CURVES = 6
-MOST_TICKS = 5  # of a scale above, whose numbers are long
+MOST_TICKS = 5  # of a scale above, whose numbers may be as long as 0.0225: seven of these overlapped
 FEW = 4  # values of an axis: a curve through them shows nothing in between
 DASHED = (0, (3, 2))
 UNSEEN = 0.01  # of a plot's height: what lies closer is one line to the eye
