@@ -112,7 +112,7 @@ def start_text(kind: str) -> str:
         return built_in()[kind].read_text(encoding="utf-8")
     if kind not in KINDS.foreign:
         what, names = "no such kind of study, or none with a file to start from", [*known, *KINDS.foreign]
-        remedy = did_you_mean(kind, known)
+        remedy = did_you_mean(kind, list(known))
         raise BadInput(what, where=kind, expected=f"one of {', '.join(names)}", remedy=remedy)
     return str(cast(Any, KINDS[kind]).start) + shared
 

@@ -257,7 +257,7 @@ def kind_named(name: str, where: str = "kind") -> Kind:
     """The kind of that name; its results are declared from then on. Raises BadInput for an unknown one."""
     if name not in KINDS:
         known = kind_names()
-        remedy = did_you_mean(name, {one: one for one in known} | MEANT) or ABSENT
+        remedy = did_you_mean(MEANT.get(name, name), known) or ABSENT
         expected = f"one of {', '.join(known)}"
         raise BadInput("unknown kind of study", where=where, expected=expected, received=repr(name), remedy=remedy)
     return KINDS[name]
