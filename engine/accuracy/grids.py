@@ -158,13 +158,12 @@ class SceneGrid:
     def _statics(self, model: SceneModel, by: tuple[int, int], timeline: Timeline) -> Statics:
         """Static readings along a timeline of so many steps in one of the grid's and of its free vibration: where all
         modes are known they are the scene's own, to the last bit, whichever march asks first, and the largest are
-        looked for at the same places. Sprung masses stand on the kept modes, so that theirs are the march's own."""
-        numerics, sprung = model.numerics, any(sensor.carriage for sensor in self.asked.study.sensor.values())
-        all_known = numerics.static_correction and not sprung
-        key = (numerics.fidelity, 0 if all_known else model.body_modes, *by)
+        looked for at the same places."""
+        numerics = model.numerics
+        key = (numerics.fidelity, 0 if numerics.static_correction else model.body_modes, *by)
         if key not in self._readings:
             corrected = self.scene.numerics._replace(fidelity=numerics.fidelity, static_correction=True)
-            teller = self.model(corrected) if all_known else model
+            teller = self.model(corrected) if numerics.static_correction else model
             sensors = SceneTables(teller, self.unit, self.asked.window, self.readings).sensors
             found = Statics(teller, timeline, sensors)
             if by != (1, 1):

@@ -69,11 +69,12 @@ def carried_by_modes(modal: ModalBody, left: Array, right: Array) -> Array:
 
 def residual_flexibility(model: SceneModel, one: Attachment, other: Attachment, along: Along) -> Array:
     """(S or 1,) what they miss of it."""
+    heres = [along[one.rider].here for one in (one, other) if one.rider is not None]
+    both = np.logical_and.reduce([here for here in heres if here is not None])
+    if not both.any():
+        return np.zeros(1)
     places, directions = (place(one, along), place(other, along)), (one.direction, other.direction)
-    whole = model.bodies[one.body].modal.flexibility_between(*places, directions)
-    for attachment in (one, other):
-        if attachment.rider is not None and (here := along[attachment.rider].here) is not None:
-            whole = np.where(here, whole, 0.0)
+    whole = np.where(both, model.bodies[one.body].modal.flexibility_between(*places, directions), 0.0)
     return np.asarray(one.factor * other.factor * whole - modal_flexibility_between(model, one, other, along))
 
 
@@ -143,11 +144,10 @@ def _with_negative(flexibility: Array) -> Mask:
 
 
 def residual(model: SceneModel, along: Along, ties: Counts) -> Array:
-    """(S, ties, ties) flexibility that the kept modes miss between the contacts of bodies that ride and some ties, by
-    their numbers, and between pushes along and across tracks, m/N; (0, 0, 0) where there are none, or no static
-    correction."""
+    """(S, ties, ties) flexibility that the kept modes miss between springs and some ties, by their numbers, and between
+    pushes along and across tracks, m/N; (0, 0, 0) where there are none, or no static correction."""
     springs = dict(enumerate(model.springs, start=model.first_spring))
-    felt = [place for place, r in enumerate(ties) if r in springs and springs[r].held and not springs[r].rigid]
+    felt = [place for place, r in enumerate(ties) if r in springs and not springs[r].rigid]
     own = [place for place, r in enumerate(ties) if r in model.corrected]
     if not (felt or own) or not model.numerics.static_correction:
         return np.zeros((0, 0, 0))

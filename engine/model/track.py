@@ -48,11 +48,11 @@ class TieRows(NamedTuple):
     def part(self, stations: slice, ties: Counts) -> TieRows:
         """Some of the stations, and some of the ties."""
         own = np.searchsorted(self.ties, ties)
-        rows, drive, level, missed = self.rows[stations], self.drive[stations], self.level[stations], self.residual
+        rows, drive, level, missed = (of[stations] for of in (self.rows, self.drive, self.level, self.residual))
         if own.size < self.ties.size:
             rows, drive, level = rows.take(own, 2), drive.take(own, 1), level.take(own, 1)
             missed = among(missed, own)
-        return TieRows(ties, rows, drive, level, missed[stations])
+        return TieRows(ties, rows, drive, level, missed)
 
 
 def among(missed: Array, ties: Counts) -> Array:

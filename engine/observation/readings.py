@@ -333,7 +333,7 @@ class SpotSensor(Sensor):
 @dataclass(frozen=True, eq=False)
 class SprungSensor(Sensor):
     """The motion of a carriage's sprung mass, whose coordinate stands at ``mode``; its static reading is the deflection
-    under its carriage by the kept modes, which its spring touches."""
+    under its carriage, which its spring feels."""
 
     mode: int
 

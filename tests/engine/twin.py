@@ -6,7 +6,7 @@ Pinned beams come from closed forms; for other supports the modal body is the en
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -246,10 +246,11 @@ def scene_of(study: Study, body: str, end: float) -> tuple[Bed, Scene, tuple[str
     numbers = {name: modes + number for number, name in enumerate(sprung)}
     phi = padded_by(bed.phi, len(sprung))
     loads = tuple(load_of(study, name, bed.length, end, numbers.get(name, 0)) for name in riders)
-    dampers = tuple(Damper(phi(at, 0), c) for at, c in bed.dampers)
+    dampers = tuple(Damper(phi(at, 0), c, at) for at, c in bed.dampers)
     table: Any = study.body[body]
     zeta = np.append(damping_of(table.damping_ratio, bed.omega), np.zeros(len(sprung)))
-    scene = Scene(phi, np.append(bed.omega, np.zeros(len(sprung))), zeta, loads, dampers)
+    missed = partial(bed.missed, derivative=0) if study.solver.static_correction else None
+    scene = Scene(phi, np.append(bed.omega, np.zeros(len(sprung))), zeta, loads, dampers, missed=missed)
     own = bool(table.own_weight)
     if study.start == "equilibrium":
         return bed, scene, riders, scenes.equilibrium(at_rest(scene, bed, study.gravity), 0.0)
@@ -339,4 +340,4 @@ def arrival_on_sag(scene: Scene, bed: Bed, gravity: float, t: float, state: Stat
             change = after.ds(t) - (0.0 if before is None else before.ds(t))
             slope = gravity * bed.sag(after.s(t), 1)
             extra += load.convective_mass * scene.phi(after.s(t), 0) * change * slope
-    return jump - np.linalg.solve(scenes.system(scene, t, "right").mass, extra)
+    return jump - np.linalg.solve(scenes.struck(scene, t), extra)

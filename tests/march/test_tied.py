@@ -135,6 +135,19 @@ def test_the_sag_counts(term: str, monkeypatch: pytest.MonkeyPatch) -> None:
         compare(given, 1e-4)
 
 
+def test_what_the_modes_left_out_would_add_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    given = case(beam(), ONE, sensor=SENSORS)
+    whole = twins.scene_of
+
+    def without(*args: Any) -> Any:
+        bed, scene, *rest = whole(*args)
+        return bed, replace(scene, missed=None), *rest
+
+    monkeypatch.setattr(twins, "scene_of", without)
+    with pytest.raises(AssertionError):
+        compare(given, 1e-4)
+
+
 # ---- published numbers, limits of the spring, energy, order, steps, and what is refused ----
 
 
@@ -180,13 +193,15 @@ def gap(one: Any, other: Any) -> float:
 
 
 def test_a_stiff_spring_is_a_rigid_mass() -> None:
-    """The difference goes with 1/k, once the spring's own oscillation is damped."""
-    rigid = crossed(mass(0.5, CROSSING), solver={"steps": 3200})
+    """The difference goes with 1/k, once the spring's own oscillation is damped, on the same modes: a rigid mass knows
+    nothing of those that are left out."""
+    solver = {"steps": 3200, "static_correction": False}
+    rigid = crossed(mass(0.5, CROSSING), solver=solver)
     found = []
     for stiffness in (1e4, 4e4):
         damping = 0.7 * 2.0 * np.sqrt(0.3 * stiffness)
         sprung = oscillator(0.3, stiffness, CROSSING, wheel_mass=0.2, damping=damping)
-        found.append(gap(crossed(sprung, solver={"steps": 3200}).place, rigid.place))
+        found.append(gap(crossed(sprung, solver=solver).place, rigid.place))
     assert found[1] < 3e-3
     assert found[1] < 0.6 * found[0]
 
@@ -243,10 +258,11 @@ def test_second_order_against_an_explicit_method() -> None:
     carriage = oscillator(0.6, 40.0, CROSSING, wheel_mass=0.2, damping=1.5)
     sensors = {"place": fixed(0.61), "up": aboard("car"), "up_rate": aboard("car", "velocity")}
     steps = (200, 400, 800)
-    exact = solve_twin(study(beam(modes=2), carriage, sensor=sensors), "bed", np.linspace(0.0, 1.25, 101))
+    kept = {"static_correction": False}
+    exact = solve_twin(study(beam(modes=2), carriage, sensor=sensors, solver=kept), "bed", np.linspace(0.0, 1.25, 101))
     errors = []
     for count in steps:
-        solver = {"steps": count, "static_correction": False}
+        solver = kept | {"steps": count}
         found = run(study(beam(modes=2), carriage, sensor=sensors, solver=solver, output=WHOLE), threads=1)
         every = count // 100
         rest = 0.6 * 9.81 / 40.0
@@ -258,6 +274,28 @@ def test_second_order_against_an_explicit_method() -> None:
         errors.append([np.abs(one.values[::every] - other).max() / np.ptp(other) for one, other in pairs])
     order = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
     assert np.all(np.abs(order[-1] - 2.0) < 0.1), order
+
+
+def test_a_mass_at_rest_stands_as_deep_as_the_whole_beam_gives_way() -> None:
+    """One mode carries 98.6 % of W L^3/(48 EI)."""
+    weight = 0.6 * 9.81
+    standing = {"kind": "cruise", "start": 0.5, "end": 0.500001, "speed": 1e-6}
+    given = study(beam(modes=1), car(standing), sensor={"up": aboard("car")}, initial="equilibrium")
+    assert float(run(given, threads=1).up_max) == pytest.approx(weight / 48.0, rel=1e-9)
+
+
+def test_two_modes_tell_a_slow_mass_what_many_do() -> None:
+    """Without what the others would add it is off by a hundredth."""
+    slow = car(cruise(0.0, 1.0, 0.02), damping=1.5)
+    given = {"sensor": {"up": aboard("car")}, "output": WHOLE}
+
+    def found(modes: int, correction: bool) -> Any:
+        solver = {"steps": 4000, "static_correction": correction}
+        return run(study(beam(modes=modes), slow, solver=solver, **given), threads=1).up
+
+    many = found(32, True)
+    assert gap(found(2, True), many) < 2e-4
+    assert gap(found(2, False), many) > 5e-3
 
 
 def test_a_lost_contact_is_told() -> None:

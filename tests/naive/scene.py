@@ -12,15 +12,19 @@ contact force F = m (g - D2w) acting on the modes, moving all that is linear in 
 A sprung mass m_s at the absolute place y is one more coordinate, a row phi of zeros with one entry e; with the row
 r = phi - e its spring and damper push the body by  S = -k (r.q) - c (r.q' + s' phi'.q):
 
-    M += m_s e e^T,  C += c r r^T,  K += k r r^T + c r (s' phi')^T,  f += m_s g e
+    m_s y'' = m_s g - S
 
-Before it arrives and after it has left it stands on rigid ground: phi = 0.
+Before it arrives and after it has left it stands on rigid ground: phi = 0. What the modes left out would add to the
+deflection under it, R F of the contact forces F of all loads and dampers, its spring sees too:
+
+    S = -k (r.q + R F) - c (r.q' + s' phi'.q)
 
 Nothing here is clever on purpose.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -71,12 +75,6 @@ class Sprung:
         if phase is None:
             return row, np.zeros_like(row)
         return row + scene.phi(phase.s(t), 0), self.convective * phase.ds(t) * scene.phi(phase.s(t), 1)
-
-    def push(self, scene: Scene, phase: Phase, t: float, state: State) -> float:
-        """S."""
-        row, slope = self.rows(scene, phase, t)
-        gap, rate = row @ state.q + self.level, row @ state.v + slope @ state.q + self.climb
-        return -float(self.stiffness * gap + self.damping * rate)
 
 
 @dataclass(frozen=True)
@@ -135,10 +133,12 @@ def mass_without_convective(mass: float, gravity: float, phases: Sequence[Phase]
 
 
 class Damper(NamedTuple):
-    """A discrete damper to ground: row psi = phi(x_d), shape (N,), and coefficient in N s/m; force -c psi (psi.q')."""
+    """A discrete damper to ground: row psi = phi(x_d), shape (N,), coefficient in N s/m, and x_d in m, which only
+    `Scene.missed` asks for; force -c psi (psi.q')."""
 
     row: Array
     coefficient: float
+    at: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,8 @@ class Scene:
     """A body of N modes and what acts on it.
 
     phi(s, derivative) -> (N,), unit modal mass; omega (N,) rad/s; zeta (N,); own_weight (N,) modal force of gravity.
-    Where masses are sprung, N counts them too: phi and omega are zero there.
+    Where masses are sprung, N counts them too: phi and omega are zero there. missed(x, s): m at x per N at s that modes
+    left out would add; None where nothing is.
     """
 
     phi: Shape
@@ -155,6 +156,7 @@ class Scene:
     loads: tuple[Load, ...]
     dampers: tuple[Damper, ...] = ()
     own_weight: Array | None = None
+    missed: Callable[[float, float], float] | None = None
 
 
 class System(NamedTuple):
@@ -179,6 +181,54 @@ def convective_rows(phi: Shape, phase: Phase, t: float) -> tuple[Array, Array, A
     return phi(s, 0), 2.0 * ds * phi(s, 1), ds**2 * phi(s, 2) + dds * phi(s, 1)
 
 
+class Forces(NamedTuple):
+    """Forces of all loads by q'', q' and q, each (loads, N), and what does not depend on these, (loads,)."""
+
+    a: Array
+    v: Array
+    q: Array
+    rest: Array
+
+
+def wheels(scene: Scene, t: float, side: Side) -> Forces:
+    """What all loads press with besides their springs, just before or just after t; 0 off the body."""
+    found = _none(scene)
+    for j, load in enumerate(scene.loads):
+        phase = load.phase(t, side)
+        if phase is not None:
+            row, rate_row, position_row = convective_rows(scene.phi, phase, t)
+            found.a[j], found.rest[j] = -load.mass * row, load.weight
+            found.v[j], found.q[j] = -load.convective_mass * rate_row, -load.convective_mass * position_row
+    return found
+
+
+def springs(scene: Scene, t: float, side: Side, pressing: Forces) -> Forces:
+    """S of all loads beside what they press with besides."""
+    found, count = _none(scene), len(scene.loads)
+    phases = [load.phase(t, side) for load in scene.loads]
+    soft = np.zeros((count, count))
+    for i, (one, phase) in enumerate(zip((load.sprung for load in scene.loads), phases, strict=True)):
+        if one is None:
+            continue
+        row, slope = one.rows(scene, phase, t)
+        found.v[i], found.q[i] = -one.damping * row, -one.stiffness * row - one.damping * slope
+        found.rest[i] = -one.stiffness * one.level - one.damping * one.climb
+        if scene.missed is not None and phase is not None:
+            here = phase.s(t)
+            for j, other in enumerate(phases):
+                soft[i, j] = 0.0 if other is None else one.stiffness * scene.missed(here, other.s(t))
+            for damper in scene.dampers:
+                pushed = one.stiffness * scene.missed(here, damper.at) * damper.coefficient
+                found.v[i] += pushed * damper.row
+    together = (np.linalg.solve(np.eye(count) + soft, s - soft @ w) for s, w in zip(found, pressing, strict=True))
+    return Forces(*together)
+
+
+def _none(scene: Scene) -> Forces:
+    shape = len(scene.loads), len(scene.omega)
+    return Forces(np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape[0]))
+
+
 def system(scene: Scene, t: float, side: Side) -> System:
     """The coupled matrices just before or just after t, assembled as in the module's docstring."""
     mass = np.eye(len(scene.omega))
@@ -187,23 +237,19 @@ def system(scene: Scene, t: float, side: Side) -> System:
     force = np.zeros(len(scene.omega)) if scene.own_weight is None else scene.own_weight.copy()
     for damper in scene.dampers:
         damping = damping + damper.coefficient * np.outer(damper.row, damper.row)
-    for load in scene.loads:
-        phase = load.phase(t, side)
+    w = wheels(scene, t, side)
+    s = springs(scene, t, side, w)
+    for j, load in enumerate(scene.loads):
+        phase, row = load.phase(t, side), np.zeros(len(scene.omega))
         if load.sprung is not None:
-            one = load.sprung
-            r, slope = one.rows(scene, phase, t)
-            mass[one.number, one.number] = one.mass
-            damping = damping + one.damping * np.outer(r, r)
-            stiffness = stiffness + one.stiffness * np.outer(r, r) + one.damping * np.outer(r, slope)
-            force = force - r * (one.stiffness * one.level + one.damping * one.climb)
-            force[one.number] += one.weight
-        if phase is None:
-            continue
-        row, rate_row, position_row = convective_rows(scene.phi, phase, t)
-        mass = mass + load.mass * np.outer(row, row)
-        damping = damping + load.convective_mass * np.outer(row, rate_row)
-        stiffness = stiffness + load.convective_mass * np.outer(row, position_row)
-        force = force + load.weight * row
+            row, _ = load.sprung.rows(scene, phase, t)
+            mass[load.sprung.number, load.sprung.number] = load.sprung.mass
+            force[load.sprung.number] += load.sprung.weight
+        below = row if phase is None else scene.phi(phase.s(t), 0)
+        mass = mass - np.outer(below, w.a[j]) - np.outer(row, s.a[j])
+        damping = damping - np.outer(below, w.v[j]) - np.outer(row, s.v[j])
+        stiffness = stiffness - np.outer(below, w.q[j]) - np.outer(row, s.q[j])
+        force = force + below * w.rest[j] + row * s.rest[j]
     return System(mass, damping, stiffness, force)
 
 
@@ -216,15 +262,11 @@ def acceleration(scene: Scene, t: float, state: State, side: Side) -> Array:
 
 def contact_forces(scene: Scene, t: float, state: State, a: Array, side: Side) -> Array:
     """Contact force of every load in N, 0 while it is off the body; shape (loads,)."""
-    forces = np.zeros(len(scene.loads))
-    for j, load in enumerate(scene.loads):
-        phase = load.phase(t, side)
-        if phase is not None:
-            row, rate_row, position_row = convective_rows(scene.phi, phase, t)
-            convective = rate_row @ state.v + position_row @ state.q
-            forces[j] = load.weight - load.mass * (row @ a) - load.convective_mass * convective
-            forces[j] += 0.0 if load.sprung is None else load.sprung.push(scene, phase, t, state)
-    return forces
+    w = wheels(scene, t, side)
+    s = springs(scene, t, side, w)
+    on = np.array([load.active(t, side) for load in scene.loads], dtype=np.float64)
+    forces = [one.a @ a + one.v @ state.v + one.q @ state.q + one.rest for one in (w, s)]
+    return on * (forces[0] + forces[1])
 
 
 def impulse(scene: Scene, t: float, state: State) -> Array:
@@ -245,8 +287,13 @@ def impulse(scene: Scene, t: float, state: State) -> Array:
             momentum += load.mass * row * (row @ state.v + convective - load.arrival_speed)
         else:
             momentum += load.convective_mass * row * (after.ds(t) - before.ds(t)) * slope
-    jump: Array = -np.linalg.solve(system(scene, t, "right").mass, momentum)
+    jump: Array = -np.linalg.solve(struck(scene, t), momentum)
     return jump
+
+
+def struck(scene: Scene, t: float) -> Array:
+    """M just after t of what an impulse moves, which no spring passes on."""
+    return system(replace(scene, missed=None), t, "right").mass
 
 
 def _jumps(before: Phase, after: Phase) -> bool:
