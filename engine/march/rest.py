@@ -15,7 +15,7 @@ from engine.model.scene_model import with_numerics
 from engine.model.station_path import standing
 from engine.observation.histories import counts_at_rest
 from engine.observation.signals import build_sensors
-from engine.statics.coupled_modes import coupled_modes
+from engine.statics.coupled_modes import CoupledModes, coupled_modes
 from results_schema.arrays import Array, Counts
 
 if TYPE_CHECKING:
@@ -119,19 +119,20 @@ def _rests(tables: SceneTables, values: VariantValues, counts: Counts, history: 
     if not own.size:
         return
     readings, seconds = history[np.searchsorted(counts, own)], elapsed(tables, own, values.scene_time_scale).T
+    model, along = _of_few_modes(tables.model), standing(tables.timeline, tables.at_rest)
+    sensors, modes = build_sensors(model), coupled_modes(model, values, along, LOWEST)
     for j, (name, static) in enumerate(zip(tables.model.study.sensor, _static(tables, values), strict=True)):
         band = tables.model.study.sensor[name].settling_band
         if band is not None:
-            off, longest = np.abs(readings[:, j] - static), _longest_swing(tables, values, j)
+            off = np.abs(readings[:, j] - static)
+            longest = _longest_swing(modes, sensors[j].reads_whole.loose(model, along)[-1])
             yield _Rest(name, off, seconds - seconds[0], seconds[0], longest, band)
 
 
-def _longest_swing(tables: SceneTables, values: VariantValues, sensor: int) -> Array:
-    """(V,) s: the longest period of what a sensor reads of the lowest modes of the scene with its carriages where they
-    rest, or of two beats of neighbours among these; 0 where it reads none."""
-    model, along = _of_few_modes(tables.model), standing(tables.timeline, tables.at_rest)
-    omega, shapes = coupled_modes(model, values, along, LOWEST)
-    row = build_sensors(model)[sensor].reads_whole.loose(model, along)[-1]
+def _longest_swing(modes: CoupledModes, row: Array) -> Array:
+    """(V,) s: the longest period of what a sensor's row (N,) reads of the lowest modes of the scene with its carriages
+    where they rest, or of two beats of neighbours among these; 0 where it reads none."""
+    omega, shapes = modes
     read = np.abs(np.einsum("n,vnk->vk", row, np.nan_to_num(shapes[:, 0])))
     own = np.where(read > READ * read.max(axis=1, keepdims=True), omega[:, 0], np.nan)
     ordered = np.sort(own, axis=1)  # NaN at the end
