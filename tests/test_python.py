@@ -65,6 +65,11 @@ def test_unknown_options_are_refused(run: Any) -> None:
     assert said.startswith("nthreads: unknown option; expected one of ") and 'did you mean "threads"?' in said
 
 
+@pytest.mark.parametrize("run", RUNS)
+def test_an_option_that_the_study_says_is_told_where(run: Any) -> None:
+    assert 'study.with_values({"solver.tolerance": ...})' in refused(run, scenes.study("passage"), tolerance=1e-2)
+
+
 @pytest.mark.parametrize(("run", "category"), [(engine.run, engine.Remark), (studies.run, studies.Remark)])
 def test_what_is_often_a_mistake_is_a_warning(run: Any, category: type[Warning]) -> None:
     with pytest.warns(category, match='70 Pa: no beam has this.*did you mean "70 GPa"') as told:

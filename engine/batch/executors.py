@@ -123,14 +123,18 @@ def _counts_threads(given: object) -> bool:
 
 
 def check_options(given: Iterable[str], *known: str) -> None:
-    """Refuse options that are neither known nor say where to run. Raises BadInput with the nearest one."""
+    """Refuse options that are neither known nor say where to run. Raises BadInput with the nearest one, or how a study
+    says that."""
+    from engine.scene.settings import setting_named
     from engine.study_file.spec import nearest
 
     options = (*known, *Where.__annotations__)
     for name in given:
         if name not in options:
             expected = f"one of {', '.join(options)}"
-            raise BadInput("unknown option", where=name, expected=expected, remedy=nearest(name, options))
+            key = setting_named(name)
+            remedy = f'the study says that: study.with_values({{"{key}": ...}})' if key else nearest(name, options)
+            raise BadInput("unknown option", where=name, expected=expected, remedy=remedy)
 
 
 def check_chunk(chunk: object) -> None:

@@ -253,3 +253,13 @@ class Sweep(Spec):
     def axes(self) -> dict[str, SweepAxis]:
         """Axes by name, in the order of the file."""
         return dict(self.__pydantic_extra__)
+
+
+def setting_named(option: str) -> str:
+    """The dotted key by which a study says what an option's name tells; "" where there is none.
+
+    >>> setting_named("tolerance"), setting_named("threads")
+    ('solver.tolerance', '')
+    """
+    tables = {"solver": Solver, "output": Output}
+    return next((f"{table}.{option}" for table, spec in tables.items() if option in spec.model_fields), "")

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import click
 
+from engine.scene.settings import setting_named
 from results_schema.errors import BadInput, Interrupted, OutputFailed, WanderlastError, WorkersGaveUp
 
 _OUTPUT_ERRORS = {errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.EFBIG}
@@ -74,6 +75,9 @@ def _complain_about_usage(error: click.UsageError) -> None:
             error.show()
         return
     _complain(error.format_message())
+    if isinstance(error, click.NoSuchOption) and (key := setting_named(error.option_name.lstrip("-"))):
+        table, name = key.split(".")
+        click.echo(f"the study file says that: {name} = ... below [{table}]", err=True)
     if error.ctx is not None:
         click.echo(f'try "{error.ctx.command_path} --help"', err=True)
 

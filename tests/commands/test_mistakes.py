@@ -156,6 +156,10 @@ MISTAKES = {
         SMALL.replace('motion = { kind = "cruise", ', 'motion = {\nkind = "cruise", '), 2, ["[carriage.NAME.motion]"],
     ),
     "Gpa": (SMALL.replace("= 1e9", '= "210 Gpa"'), 2, ['did you mean "GPa"']),
+    "MPa of steel": (
+        SMALL.replace("= 1e9", '= "210 MPa"').replace("density = 1000.0", "density = 7850.0"),
+        0, ["body.beam.youngs_modulus = 2.1e+08 Pa", 'did you mean "210 GPa"?'],
+    ),
     "newtons per micron": (
         SMALL.replace('supports = "pinned-pinned"', 'supports = [{ at = 0.1, stiffness = "400 N/mu" }]'),
         2, ["supports.0.stiffness", 'did you mean "400 N/um"?'],
@@ -301,6 +305,10 @@ def test_a_run_asks_before_it_computes(capsys: pytest.CaptureFixture[str], monke
     monkeypatch.setattr("studies.protocol.parts.Variants.compute", compute)
     Path("study.toml").write_text(SMALL.replace("= 1000.0", "= 7.85"))
     told(capsys, 2, "run", "study.toml")
+
+
+def test_an_option_that_the_study_file_says_is_told_where(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "tolerance = ... below [solver]" in told(capsys, 2, "run", "passage", "--tolerance", "1e-2")
 
 
 def test_no_file_is_proposed_for_its_ending_alone(capsys: pytest.CaptureFixture[str]) -> None:

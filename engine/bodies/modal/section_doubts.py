@@ -16,7 +16,7 @@ from engine.study_file.units import Area, Density, Dimensionless, Length, Pressu
 class Doubt(Check):
     """A condition that a study may break, but hardly means to; `needs` begins with the number in doubt.
 
-    others: units in which that number may have been thought.
+    others: units in which that number may have been thought; "MPa=GPa" where it is one in MPa that was thought in GPa.
     """
 
     unit: Unit
@@ -28,8 +28,11 @@ class Doubt(Check):
 
     def meant(self, values: Mapping[str, Any]) -> str:
         """The number with other units that make it likely, as a question, or ""."""
-        number = self.needs[0]
-        texts = (f"{values[number]:.6g} {unit}" for unit in self.others)
+        number, texts = self.needs[0], list[str]()
+        for other in self.others:
+            typed, _, thought = other.rpartition("=")
+            size = self.unit.si(f"1 {typed}") if typed else 1.0
+            texts.append(f"{values[number] / size:.6g} {thought}")
         likely = [f'"{text}"' for text in texts if self.met({**values, number: self.unit.si(text)})]
         return f"did you mean {' or '.join(likely)}?" if likely else ""
 
@@ -53,7 +56,7 @@ def section_doubts(here: str, length: str, *fibres: str) -> list[Doubt]:
     area, inertia = f"{here}.area", f"{here}.second_moment"
     return [
         doubt(Pressure, "GPa MPa", material[:1], "1e5 to 2e12 Pa, steel 2.1e11", _modulus_of_matter),
-        doubt(Pressure, "", material, "above 5e8 Pa for what is denser than 2000 kg/m3", _stiff_where_heavy),
+        doubt(Pressure, "MPa=GPa", material, "above 5e8 Pa for what is denser than 2000 kg/m3", _stiff_where_heavy),
         doubt(Density, "g/cm^3 t/mm^3", material[1:], "20 to 50000 kg/m3, steel 7850", _density_of_matter),
         doubt(Length, "mm cm", (length,), "1e-4 to 1e4 m", lambda size: (size >= 1e-4) & (size <= 1e4)),
         doubt(Area, "mm^2 cm^2", (area, length), "at most length^2/4, in m2",
