@@ -261,5 +261,5 @@ def setting_named(option: str) -> str:
     >>> setting_named("tolerance"), setting_named("threads")
     ('solver.tolerance', '')
     """
-    tables = {"solver": Solver, "output": Output}
+    tables: dict[str, type[Spec]] = {"solver": Solver, "output": Output}
     return next((f"{table}.{option}" for table, spec in tables.items() if option in spec.model_fields), "")
