@@ -87,10 +87,10 @@ def settling_times(tables: SceneTables, values: VariantValues, counts: Counts, h
     found = Settling({}, {})
     for rest in _rests(tables, values, counts, history):
         settling_time, move_and_settle_time = names_of_times(rest.sensor)
-        found.times[settling_time] = rest.settled_within(1.0)
-        found.times[move_and_settle_time] = rest.begins + found.times[settling_time]
-        others = [[rest.settled_within(1.0 + sign * part) for part in WIDER] for sign in (1.0, -1.0)]
-        found.other_bands[rest.sensor] = np.moveaxis(np.array(others), 2, 0)
+        wider = np.array(WIDER)
+        own, *others = rest.settled_within(np.concatenate([[1.0], 1.0 + wider, 1.0 - wider]))
+        found.times[settling_time], found.times[move_and_settle_time] = own, rest.begins + own
+        found.other_bands[rest.sensor] = np.moveaxis(np.reshape(others, (2, wider.size, -1)), 2, 0)
     return found
 
 
@@ -105,11 +105,11 @@ class _Rest(NamedTuple):
     longest: Array
     band: float
 
-    def settled_within(self, part: float) -> Array:
-        """(V,) s after the stop: when it has settled within a part of its band."""
-        band = part * self.band
-        when = last_beyond(self.off, band, self.seconds)
-        may_swing = (self.off > STILL * band).any(axis=0)
+    def settled_within(self, parts: Array) -> Array:
+        """(B, V) s after the stop: when it has settled within parts (B,) of its band."""
+        bands = parts * self.band
+        when = last_beyond(self.off, bands, self.seconds)
+        may_swing = np.fmax.reduce(self.off, axis=0) > STILL * bands[:, None]
         return np.where(may_swing & (self.seconds[-1] - when < self.longest), np.nan, when)
 
 
@@ -149,20 +149,21 @@ def _of_few_modes(model: SceneModel) -> SceneModel:
     return with_numerics(model, few)
 
 
-def last_beyond(off: Array, band: float, seconds: Array) -> Array:
-    """(V,) when what is off (H, V) at times (H, V) comes within a band for good, between stations along a line.
+def last_beyond(off: Array, bands: Array, seconds: Array) -> Array:
+    """(B, V) when what is off (H, V) at times (H, V) comes within bands (B,) for good, between stations along a line.
 
-    >>> last_beyond(np.array([[3.0, 0.1], [1.0, 0.2]]), 2.0, np.array([[0.0, 0.0], [1.0, 1.0]])).tolist()
-    [0.5, 0.0]
+    >>> last_beyond(np.array([[3.0, 0.1], [1.0, 0.2]]), np.array([2.0]), np.array([[0.0, 0.0], [1.0, 1.0]])).tolist()
+    [[0.5, 0.0]]
     """
-    beyond, lanes = ~(off <= band), np.arange(off.shape[1])
-    last = len(off) - 1 - np.argmax(beyond[::-1], axis=0)
-    here, after = np.minimum(last, len(off) - 2), np.minimum(last + 1, len(off) - 1)
+    stations, lanes = len(off), np.arange(off.shape[1])
+    still_to_come = np.maximum.accumulate(np.where(np.isnan(off), np.inf, off)[::-1])
+    within = [np.searchsorted(still_to_come[:, lane], bands, side="right") for lane in lanes]
+    last = stations - 1 - np.stack(within, axis=1)  # -1 where none is beyond
+    here, after = np.clip(last, 0, stations - 2), np.clip(last + 1, 0, stations - 1)
     with np.errstate(invalid="ignore", divide="ignore"):
-        part = (off[here, lanes] - band) / (off[here, lanes] - off[after, lanes])
+        part = (off[here, lanes] - bands[:, None]) / (off[here, lanes] - off[after, lanes])
         when = seconds[here, lanes] + part * (seconds[after, lanes] - seconds[here, lanes])
-    when = np.where(last == len(off) - 1, np.nan, when)
-    return np.asarray(np.where(beyond.any(axis=0), when, 0.0))
+    return np.asarray(np.where(last < 0, 0.0, np.where(last == stations - 1, np.nan, when)))
 
 
 def _static(tables: SceneTables, values: VariantValues) -> Array:

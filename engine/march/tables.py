@@ -134,13 +134,18 @@ class SceneTables:
         return found
 
     def _from(self, segment: Segment) -> tuple[Segment, ...]:
-        """A segment and those that follow, as many as are tabulated at once: short ones take hardly longer together."""
-        following = [one for one in self.timeline.segments if one.first > segment.first]
+        """A segment and those that follow, as many as are tabulated at once: short ones take hardly longer together,
+        and those at rest, which are the last ones, need one station each."""
+        if segment.rests:
+            return (segment,)
+        following = [one for one in self.timeline.segments if one.first > segment.first and not one.rests]
         stations = np.cumsum([segment.steps + 1, *(one.steps + 1 for one in following)])
         return (segment, *following[: np.count_nonzero(stations[1:] <= MOST_STATIONS)])
 
     def _build(self, segments: Sequence[Segment], missed: Missed) -> list[SegmentTable]:
         along = ways(self.model, *segments)
+        if segments[0].rests:
+            along = tuple(way.at(0) for way in along)
         numbers = ties_of(self.model, np.any([segment.active for segment in segments], axis=0))
         if not missed:
             found = residual(self.model, along, numbers), tabulate_missed(self.model, self.signals, along, numbers)
@@ -154,6 +159,10 @@ class SceneTables:
             (last_signals(watch, contacts), self.signals[-contacts:]) if contacts else (watch, self.signals)
         )
         rows = tie_rows(self.model, along, numbers, found[0])
+        if segments[0].rests:
+            stations = segments[0].steps + 1
+            rows = rows.held(stations)
+            watch, unrecorded = (signals.held(one, stations) for one in (watch, unrecorded))
         if len(segments) == 1:
             return [SegmentTable(numbers, closed(self.model, rows, self.scheme), watch, unrecorded)]
         tables, ends = list[SegmentTable](), np.cumsum([segment.steps + 1 for segment in segments])

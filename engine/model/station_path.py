@@ -6,7 +6,7 @@ Derivatives by time are counted per step: ds = S' h and dds = S'' h^2 in scene t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -43,6 +43,12 @@ class StationPath:
     def on(self) -> NDArray[np.bool_]:
         """(S,) at which stations it touches."""
         return np.full(self.s.size, self.active) if self.here is None else self.here
+
+    def at(self, station: int) -> StationPath:
+        """It at one station alone."""
+        own = slice(station, station + 1)
+        here = None if self.here is None else self.here[own]
+        return replace(self, s=self.s[own], ds=self.ds[own], dds=self.dds[own], here=here, _shapes={})
 
     def shape(self, body: ModalBody, derivative: int = 0) -> Array:
         """(S, N) mode shapes of its body along the way."""

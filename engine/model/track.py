@@ -54,6 +54,11 @@ class TieRows(NamedTuple):
             missed = among(missed, own)
         return TieRows(ties, rows, drive, level, missed)
 
+    def held(self, stations: int) -> TieRows:
+        """Those of one station at so many."""
+        own = (self.rows, self.drive, self.level, self.residual)
+        return TieRows(self.ties, *(np.repeat(of, stations, axis=0) for of in own))
+
 
 def among(missed: Array, ties: Counts) -> Array:
     """(stations, ..., ties, ties) residual flexibilities between some of the ties."""

@@ -122,6 +122,12 @@ def along_part(watch: Observation, signals: tuple[Signal, ...], part: slice, tie
     )
 
 
+def held(watch: Observation, stations: int) -> Observation:
+    """Those of one station at so many."""
+    own = {name: np.repeat(getattr(watch, name), stations, axis=0) for name in ("static", "offset", "counted")}
+    return watch._replace(**own)
+
+
 def last_signals(watch: Observation, count: int) -> Observation:
     """The last so many signals of a watch, which have no channels, such as contact forces."""
     part = slice(watch.counted.shape[1] - count, None)
