@@ -113,7 +113,9 @@ def test_a_disk_that_is_full_then_is_code_74(
     assert_same_archives(whole, open_archive(ran("passage", tmp_path / "a.nc")))
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    "kind", ["passage", *(pytest.param(kind, marks=pytest.mark.slow) for kind in KINDS if kind != "passage")]
+)
 def test_commands_read_the_same(
     kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -71,8 +71,10 @@ with xarray.open_dataset("found.nc") as found:
 """
 
 
-@pytest.mark.parametrize("call", ["write other.nc", "report page", "export found.csv", "answer", "figures", "errors"])
-@pytest.mark.parametrize("kind", ["passage", "asymmetry"])
+CALLS = ["write other.nc", "report page", "export found.csv", "answer", "figures", "errors"]
+
+
+@pytest.mark.parametrize(("kind", "call"), [*(("passage", call) for call in CALLS), ("asymmetry", "report page")])
 def test_an_archive_is_known_to_a_fresh_process(kind: str, call: str, tmp_path: Path) -> None:
     """`report` and `write` refused every archive whose kind of study had not been used before."""
     studies.write(scenes.run(kind, scenes.pace(kind)), tmp_path / "found.nc")
