@@ -12,7 +12,6 @@ from pathlib import Path
 
 import click
 
-from engine.scene.settings import setting_named
 from results_schema.errors import BadInput, Interrupted, OutputFailed, WanderlastError, WorkersGaveUp
 
 _OUTPUT_ERRORS = {errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.EFBIG}
@@ -70,6 +69,8 @@ def _words(error: Exception) -> str:
 
 
 def _complain_about_usage(error: click.UsageError) -> None:
+    from engine.scene.settings import setting_named
+
     if isinstance(error, click.exceptions.NoArgsIsHelpError):
         with suppress(OSError):
             error.show()

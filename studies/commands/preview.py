@@ -13,10 +13,11 @@ from engine.batch.audit import audited
 from engine.batch.dataset import model_groups
 from engine.batch.plan import Plan
 from engine.batch.remarks_of_carriages import sprung
+from engine.model.attachment import tie_shapes
 from engine.model.distinct_models import base_scene
 from engine.model.lane_table import moving_mass, weight
 from engine.model.scene_model import SceneModel
-from engine.model.station_path import frozen
+from engine.model.station_path import Along, frozen
 from engine.scene.sensors import Envelope, Sensor
 from engine.scene.study import Study
 from engine.scene.sweep import Cases, cells_of, expand
@@ -247,23 +248,28 @@ def _standing(plan: Plan) -> TextTable:
         low, high = np.clip(tie.rider.range, 0.0, body.length)
         places = np.linspace(low, high, STANDS)
         sag = np.abs(body.influence_at(places, places) * weight(base, values, 0)[0])
-        modes = coupled_modes(base, values, frozen(base, places), 1)
+        along = frozen(base, places)
+        modes = coupled_modes(base, values, along, 1)
         most = f"up to {quantity(float(sag.max()), 'm')}, at {quantity(float(places[sag.argmax()]), 'm')}"
         frequencies = spanned(modes.omega.ravel() / (2.0 * np.pi))
-        rows.append((tie.name, most, f"{frequencies} Hz", _damping_with_it(base, values, modes)))
+        rows.append((tie.name, most, f"{frequencies} Hz", _damping_with_it(base, values, along, modes)))
     where = ", in the scene without its sweep" * bool(plan.study.sweep.axes)
     headings = ("carriage", "static deflection under it alone", "lowest frequency with it", "its damping ratio")
     return TextTable(f"Where the first carriage stands{where}", headings, rows)
 
 
-def _damping_with_it(base: SceneModel, values: VariantValues, modes: CoupledModes) -> str:
-    """What damping ratios of the bodies' own modes leave to modes with what rides on them; "" where dampers or sprung
-    carriages damp too."""
-    sprung = any(carriage.suspension is not None for carriage in base.study.carriage.values())
-    if sprung or any(has_dampers(base.study, part.name) for part in base.bodies):
+def _damping_with_it(base: SceneModel, values: VariantValues, along: Along, modes: CoupledModes) -> str:
+    """What damping ratios of the bodies' own modes and dampers beside springs leave to modes with what rides on them;
+    "" where dampers hold the bodies too."""
+    if any(has_dampers(base.study, part.name) for part in base.bodies):
         return ""
     rates = np.concatenate([values.damping_rates(part.name, part.modal.omega) for part in base.bodies])
     by_mode = np.einsum("kv,vskn->vsn", rates, modes.shapes[:, :, : len(rates)] ** 2)
+    damped = {r: spring for r, spring in enumerate(base.springs, start=base.first_spring) if spring.damped}
+    for place, spring in enumerate(damped.values()):
+        row = tie_shapes(base, list(damped), along)[:, :, place]
+        gap = np.einsum("sk,vskn->vsn", row, modes.shapes)
+        by_mode += values.column(spring.keys.damping)[:, None, None] * gap**2
     return spanned((by_mode / (2.0 * modes.omega)).ravel())
 
 

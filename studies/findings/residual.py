@@ -139,6 +139,9 @@ def _residual(results: Results, sensor: str, asked: AskedOfRest) -> str:
     units, values = results.sensors[sensor], residual_of(results, sensor)
     place = extreme(values)
     if place is None:
+        rides = results.study.sensor[sensor].rides
+        if rides is not None:
+            return f"{sensor}: it is not read once {rides} has left, so that no residual vibration is told."
         return f"{sensor}: no variant has a residual vibration."
     size = float(values[place])
     if quiet(results, sensor):

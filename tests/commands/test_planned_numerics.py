@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy.linalg
 
 from engine.accuracy.groups import Found
 from engine.accuracy.jobs import InTurn
@@ -58,8 +59,11 @@ def test_where_the_first_carriage_stands() -> None:
     assert float(low) == pytest.approx(0.5 * math.pi / math.sqrt(1.2), rel=1e-2)
     assert float(high) == pytest.approx(0.5 * math.pi, rel=1e-2)
     assert [float(end) for end in damping.split(" to ")] == pytest.approx([0.02 / math.sqrt(1.2), 0.02], rel=1e-2)
-    swung = standing(study(bed, oscillator(0.3, 9.0, way), gravity=4.8, solver=solver))
-    assert [row[3] for row in swung] == [""]
+    ((*_, damping),) = standing(study(bed, oscillator(0.3, 9.0, way), gravity=4.8, solver=solver))
+    stiffness = np.array([[math.pi**4 + 18.0, -9.0 * math.sqrt(2.0)], [-9.0 * math.sqrt(2.0), 9.0]])
+    square, shapes = scipy.linalg.eigh(stiffness, np.diag([1.0, 0.3]))  # of the first mode alone, in the middle
+    ratio = 0.02 * math.pi**2 * shapes[0, 0] ** 2 / math.sqrt(square[0])
+    assert [float(end) for end in damping.split(" to ")] == pytest.approx([0.0, ratio], rel=3e-2, abs=1e-12)
 
 
 def test_what_moves_away_stands_nowhere() -> None:
@@ -197,3 +201,14 @@ def test_the_audit_of_what_pilots_tell_is_forecast(plan: Plan) -> None:
         other.choice = plan.choice
         seconds.append(audit_seconds(other))
     assert seconds[0] == 0.0 < seconds[1] < seconds[2] and seconds[1] == audit_seconds(plan)
+
+
+def test_a_mass_on_its_damper_over_a_stiff_beam_is_damped_as_by_itself() -> None:
+    """0.25, beside next to nothing of the beam's own 2 %."""
+    mass_, stiffness = 0.1, 1e-3
+    car = oscillator(mass_, stiffness, cruise(0.3, 0.7, 0.1), damping=0.5 * math.sqrt(stiffness * mass_))
+    given = study(beam(damping_ratio=0.02), car)
+    tables = {table.title: table for table in preview(kind_of(given).parts(given), 1).tables}
+    alone, standing = tables["Sprung masses by themselves"], tables["Where the first carriage stands"]
+    assert alone.rows[0][2] == "0.25"
+    assert standing.rows[0][standing.headings.index("its damping ratio")] == "0.25"

@@ -18,7 +18,7 @@ from studies.protocol.study import kind_of
 from studies.reporting import answers, summary
 from studies.results.formatting import quantity
 from studies.results.results import Results
-from tests.engine.build import beam, force, study
+from tests.engine.build import aboard, beam, cruise, fixed, force, oscillator, study
 
 PAGE = Path(__file__).parents[2] / "docs" / "study-file.md"
 MOVE = {"kind": "point-to-point", "start": 0.2, "end": 0.7, "speed": 3.0, "acceleration": 9.0, "dwell": 1.5}
@@ -149,6 +149,14 @@ def test_a_limit_in_another_unit_is_doubted() -> None:
     told = [float(seen[1]) for text in answers.answer(found) if (seen := doubt.search(text))]
     largest = found.midspan_residual.max(), found.midspan_max.max()
     assert told == pytest.approx([3000.0 / float(size) for size in largest], rel=5e-3)
+
+
+def test_what_leaves_is_said_not_to_be_read_then() -> None:
+    sensors = {"midspan": fixed(0.5), "load": aboard("car")}
+    car = oscillator(0.3, 30.0, cruise(0.0, 1.0, 1.0, after=3.0), wheel_mass=0.05)
+    found = studies.run(study(beam(), car, kind="passage", sensor=sensors, output={"residual": True}))
+    told = [text for text in answers.answer(found) if "once car has left" in text]
+    assert told == ["load: it is not read once car has left, so that no residual vibration is told."]
 
 
 def test_what_is_not_asked_is_not_told() -> None:
