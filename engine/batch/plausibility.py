@@ -122,15 +122,14 @@ def _braking(plan: Plan) -> Iterator[str]:
     if number < 0 or (asked and told_of(plan.base, of_loads=True)):
         return
     tie = plan.base.carriages[number]
-    remedy = "frames take it with inertia_along = true, and track.offset where it stands beside the axis"
+    remedy = "frames take it with inertia_along = true"
     if "along" in could.get(tie.name, ()):
         remedy = f"{study.source.written(f'carriage.{tie.name}')}.inertia_along = true brings it"
     elif study.carriage[tie.name].riding_body is not None:
         remedy = "bodies on contacts never push along"
     yield (
         f"the force that brakes {tie.name}, up to {_newtons(force)}, does not push "
-        f"{plan.base.bodies[tie.body].name} along its track, nor bend it where the track lies beside its axis, so that "
-        f"vibration by that is not in the answer; {remedy}"
+        f"{plan.base.bodies[tie.body].name} along its track, nor bend it where the track lies beside its axis; {remedy}"
     )
 
 

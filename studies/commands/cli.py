@@ -195,7 +195,8 @@ def compare(first: Path, second: Path) -> int:
 @click.argument("archive", type=_FILE)
 @click.argument("file", type=_FILE)
 @click.option("--results", "names", metavar="NAME,NAME", default="", help="These results alone; default: all.")
-def export(archive: Path, file: Path, names: str) -> None:
+@click.option("--overwrite", is_flag=True, help="Replace another table.")
+def export(archive: Path, file: Path, names: str, overwrite: bool) -> None:
     """Write ARCHIVE as a table, FILE.csv or FILE.parquet: one row per variant (and position).
 
     Swept numbers stand in the units of the study file, results in SI units.
@@ -206,7 +207,7 @@ def export(archive: Path, file: Path, names: str) -> None:
     from studies.runs.archived import results_of
 
     chosen = [name.strip() for name in names.split(",") if name.strip()]
-    left_out = write_table(results_of(open_archive(archive)), file, chosen)
+    left_out = write_table(results_of(open_archive(archive)), file, chosen, overwrite=overwrite)
     console.say(
         f"wrote {file}",
         *([f"without what has other dimensions than its rows: {', '.join(left_out)}"] if left_out else []),
