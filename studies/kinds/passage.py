@@ -159,8 +159,10 @@ def _largest(results: Results, sensor: str) -> str:
     best = top if best is not None and hardly_changed(results, gain, number) else best
     if best is None:
         return f"{said}{where}{between}."
-    static = sizes(results, sensor)[best] / gain[best]
-    amplified = times(float(gain[best]), f"the static {quantity(float(static), results.sensors[sensor])}")
+    size = float(sizes(results, sensor)[best])
+    whole, static = (quantity(one, results.sensors[sensor]) for one in (size, size / float(gain[best])))
+    digits = 4 if whole != static and number(gain[best]) == "1" else 3  # not "54.7 mm, as large as the static 54.6 mm"
+    amplified = times(float(gain[best]), f"the static {static}", digits)
     amplified += with_own_weight(results.study, sensor)
     there = f"{in_words(results, best)}{_at_the_end(results, best)}"
     if best == top or there == where:

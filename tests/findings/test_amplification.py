@@ -72,6 +72,9 @@ def test_no_place_is_told_of_what_is_the_same_everywhere_as_it_is_told() -> None
     dataset["midspan_max"][:] = [1.23e-5, 1.44e-5]
     (said,) = (one for one in answers.answer(dataset) if one.startswith("midspan"))
     assert ", as large as the static 14.4 µm, at mass 100 kg." in said
+    dataset["midspan_max"][:], gain[:] = [1.23e-5, 1.4451e-5], [1.0, 1.0016]
+    (said,) = (one for one in answers.answer(dataset) if one.startswith("midspan"))
+    assert " is 14.5 µm" in said and ", 1.002 times the static 14.4 µm, at mass 100 kg." in said
 
 
 def test_rounding_is_not_told_as_a_number() -> None:
