@@ -16,7 +16,7 @@ from studies.findings.beyond import LIMITED, AskedOfRest, Limits, in_turns, out_
 from studies.findings.effects import by_effect, told_both_ways, told_effects
 from studies.results.axes import DIRECTION, VARIANT, Axis
 from studies.results.findings_common import in_words
-from studies.results.formatting import ROUNDING, counted, listed, quantity
+from studies.results.formatting import ROUNDING, counted, listed, once, quantity
 from studies.results.places import Index, chosen, extreme
 from studies.results.results import Results
 
@@ -110,6 +110,8 @@ def residuals(results: Results, asked: AskedOfRest) -> list[str]:
     exceeded."""
     sensors = ringing(results, asked.residual)[:MOST_SENSORS]
     said = [_residual(results, sensor, asked) for sensor in sensors]
+    for axis in results.axes:
+        said = once(_up_and_down(axis), said)
     if sensors and not quiet(results, sensors[0]):
         doubt = absolute_errors(results, f"{sensors[0]}_residual")
         effects = told_effects(results, residual_of(results, sensors[0]), "the largest such swing", doubt)
@@ -172,11 +174,15 @@ def _told_between(results: Results, values: Array, place: Index) -> str:
         steps = np.sign(steps[np.abs(steps) > LEAST_STEP * np.nanmax(line)])
         turns = np.count_nonzero(np.diff(steps))
         if line.size >= FEWEST and turns > (min(line.size, LAST) - 2) / 2:
-            return (
-                f" From one {axis.noun} to the next it goes up and down, so peaks between them may be higher: sweep "
-                "them more closely."
-            )
+            return f" {_up_and_down(axis)}"
     return ""
+
+
+def _up_and_down(axis: Axis) -> str:
+    return (
+        f"From one {axis.noun} to the next it goes up and down, so peaks between them may be higher: sweep them more "
+        "closely."
+    )
 
 
 def _settled(results: Results, sensor: str, asked: AskedOfRest, axis: Axis | None) -> str:

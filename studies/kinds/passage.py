@@ -52,7 +52,7 @@ from studies.results.findings_common import (
     uncertainty,
     while_held,
 )
-from studies.results.formatting import listed, number, percent, quantity, times
+from studies.results.formatting import listed, number, once, percent, quantity, times
 from studies.results.places import Index
 from studies.results.results import Results
 
@@ -99,7 +99,7 @@ class Passage(Kind):
             else "".join(tell(results, sensor) for tell in told)
             for sensor in sensors
         ]
-        said = _once(OF_LARGEST, _with_remark(said, told_between_speeds(results)))
+        said = once(OF_LARGEST, _with_remark(said, told_between_speeds(results)))
         if sensors:  # of which those after the first may be cut
             first = sensors[0]
             said[len(envelopes)] += _limited_besides(results, first) + _amplified_besides(results, first)
@@ -252,12 +252,6 @@ def _limited_besides(results: Results, told: str) -> str:
     words += [f"{len(order) - MOST_TOLD} more"] * (len(order) > MOST_TOLD)
     exceed = "exceeds its limit" if len(order) == 1 else "exceed their limits"
     return f" Of the other sensors {listed(words)} {exceed}."
-
-
-def _once(remark: str, said: list[str]) -> list[str]:
-    """Sentences with a remark in the first alone that has it."""
-    first = next((place for place, text in enumerate(said) if remark in text), -1)
-    return [text if place == first else text.replace(f" {remark}", "") for place, text in enumerate(said)]
 
 
 def _with_remark(said: list[str], remark: str) -> list[str]:

@@ -125,6 +125,16 @@ def times(ratio: float, of: str = "", digits: int = 3) -> str:
     return f"{text} times {of}".strip()
 
 
+def once(remark: str, said: Sequence[str]) -> list[str]:
+    """Sentences with a remark in the first alone that has it.
+
+    >>> once("Look closer.", ["a: 1 m. Look closer.", "b: 2 m. Look closer."])
+    ['a: 1 m. Look closer.', 'b: 2 m.']
+    """
+    first = next((place for place, text in enumerate(said) if remark in text), -1)
+    return [text if place == first else text.replace(f" {remark}", "") for place, text in enumerate(said)]
+
+
 def percent(part: float, digits: int = 2) -> str:
     """A part in percent.
 
