@@ -156,8 +156,8 @@ def last_beyond(off: Array, bands: Array, seconds: Array) -> Array:
     [[0.5, 0.0]]
     """
     stations, lanes = len(off), np.arange(off.shape[1])
-    still_to_come = np.maximum.accumulate(np.where(np.isnan(off), np.inf, off)[::-1])
-    within = [np.searchsorted(still_to_come[:, lane], bands, side="right") for lane in lanes]
+    largest_from_end = np.maximum.accumulate(np.where(np.isnan(off), np.inf, off)[::-1])
+    within = [np.searchsorted(largest_from_end[:, lane], bands, side="right") for lane in lanes]
     last = stations - 1 - np.stack(within, axis=1)  # -1 where none is beyond
     here, after = np.clip(last, 0, stations - 2), np.clip(last + 1, 0, stations - 1)
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -266,9 +266,8 @@ def _damping_with_it(base: SceneModel, values: VariantValues, along: Along, mode
     rates = np.concatenate([values.damping_rates(part.name, part.modal.omega) for part in base.bodies])
     by_mode = np.einsum("kv,vskn->vsn", rates, modes.shapes[:, :, : len(rates)] ** 2)
     damped = {r: spring for r, spring in enumerate(base.springs, start=base.first_spring) if spring.damped}
-    for place, spring in enumerate(damped.values()):
-        row = tie_shapes(base, list(damped), along)[:, :, place]
-        gap = np.einsum("sk,vskn->vsn", row, modes.shapes)
+    gaps = np.einsum("skr,vskn->rvsn", tie_shapes(base, list(damped), along), modes.shapes)
+    for gap, spring in zip(gaps, damped.values(), strict=True):
         by_mode += values.column(spring.keys.damping)[:, None, None] * gap**2
     return spanned((by_mode / (2.0 * modes.omega)).ravel())
 

@@ -281,6 +281,15 @@ def test_values_that_go_up_and_down_from_one_to_the_next_are_swept_too_coarsely(
         assert "goes up and down" not in told_of(calm)
 
 
+def test_that_values_go_up_and_down_is_said_once() -> None:
+    steps = {"acceleration": {"of": "carriage.car.motion.acceleration", "values": list(range(2, 10))}}
+    found = studies.run(stops(sweep=steps, sensor={"quarter": fixed(0.25), "midspan": fixed(0.5)}))
+    for sensor in ("quarter", "midspan"):
+        found[f"{sensor}_residual"][:] = [1e-6, 2e-6, 6.3e-6, 4.6e-6, 7.4e-6, 4.1e-6, 8.2e-6, 6.7e-6]
+    told = [text for text in answers.answer(found) if "at rest it still swings" in text]
+    assert len(told) == 2 and " ".join(told).count("goes up and down") == 1
+
+
 def test_what_is_left_as_rounding_does_not_swing() -> None:
     """It is told and drawn without a number."""
     found = studies.run(stops(sensor={"quarter": {"body": "bed", "at": 0.25}, "midspan": {"body": "bed", "at": 0.5}}))

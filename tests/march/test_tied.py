@@ -289,13 +289,12 @@ def test_two_modes_tell_a_slow_mass_what_many_do() -> None:
     slow = car(cruise(0.0, 1.0, 0.02), damping=1.5)
     given = {"sensor": {"up": aboard("car")}, "output": WHOLE}
 
-    def found(modes: int, correction: bool) -> Any:
-        solver = {"steps": 4000, "static_correction": correction}
-        return run(study(beam(modes=modes), slow, solver=solver, **given), threads=1).up
+    def found(modes: int, **solver: Any) -> Any:
+        return run(study(beam(modes=modes), slow, solver={"steps": 4000} | solver, **given), threads=1).up
 
-    many = found(32, True)
-    assert gap(found(2, True), many) < 2e-4
-    assert gap(found(2, False), many) > 5e-3
+    many = found(32)
+    assert gap(found(2), many) < 2e-4
+    assert gap(found(2, static_correction=False), many) > 5e-3
 
 
 def test_a_lost_contact_is_told() -> None:
