@@ -87,9 +87,9 @@ def engine_march(scene: Scene) -> tuple[float, Array]:
     for _ in range(BEST_OF):
         march = prepare(group.tables, plan.values(group, group.variants), np.zeros(0, dtype=np.int64))
         begun = time.thread_time()
-        march.go()
+        codes = march.go()
         best = min(best, time.thread_time() - begun)
-    statistics = march.result(scene.variants).statistics[[s.name for s in group.tables.sensors].index(MIDSPAN)]
+    statistics = march.result(codes, scene.variants).statistics[[s.name for s in group.tables.sensors].index(MIDSPAN)]
     found[group.variants] = np.maximum(statistics[0], -statistics[2])
     return best, found
 
