@@ -19,6 +19,7 @@ from engine.accuracy.ladder import ENOUGH, Ladder, March, Rungs
 from engine.accuracy.reference import Converged, Level, Marches, as_fixed, converge, in_full, is_free, left_by_elements
 from engine.kernels.schemes import Scheme
 from engine.march.outcome import vibration
+from engine.model.numerics import open_bodies
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts
 
@@ -88,7 +89,7 @@ class Climb:
         levels, full = list[Level](), Marches(self.grid, self.values, in_full(self.grid))
         aim = refer(Marches(self.grid, self.values, as_fixed(self.grid)), seen=levels.append)
         truth = aim if is_free(self.grid) else refer(full)
-        self.rungs = Rungs(self.grid, self.values, self.ladder, self.span, truth, aim, self._judged(levels))
+        self.rungs = Rungs(self.grid, self.values, self.ladder, self.span, truth, aim, self._judged(levels, aim))
         shape = len(self.ladder.columns), len(self.ladder.cuts), self.values.size
         self.found = [(np.zeros(1, dtype=np.int64), np.full((1, len(truth.error)), np.inf))]
         self.march = np.zeros(shape, dtype=np.int32)
@@ -103,11 +104,16 @@ class Climb:
             self._fill(name, enough)
         return self._measured(truth, aim is truth, left_by_elements(full, truth, self.share))
 
-    def _judged(self, levels: Sequence[Level]) -> dict[int, Level]:
-        """Levels of references that are columns whose modes are judged, by column."""
+    def _judged(self, levels: Sequence[Level], aim: Converged) -> dict[int, Level]:
+        """Levels of references that are columns whose modes are judged, by column; of modes that a study fixes the last
+        of every pilot."""
         columns = {numerics: column for column, numerics in enumerate(self.ladder.columns)}
-        last = self.ladder.columns[-1].scheme
-        return {columns[v.numerics]: v for v in levels if v.numerics in columns and v.numerics.scheme == last}
+        if open_bodies(self.grid.scene.study):
+            last = self.ladder.columns[-1].scheme
+            return {columns[v.numerics]: v for v in levels if v.numerics in columns and v.numerics.scheme == last}
+        fixed = levels[0].numerics
+        by = np.asarray(aim.used["steps_used"] // (self.grid.unit * fixed.scheme.stride), dtype=np.int64)
+        return {columns[fixed]: Level(fixed, np.arange(by.size), by, aim.outcome)} if fixed in columns else {}
 
     def _measured(self, truth: Converged, free: bool, by_elements: Array) -> Measured:
         """What the jobs found."""
@@ -136,6 +142,9 @@ class Climb:
         families: dict[int, list[int]] = {}
         for column in own:
             families.setdefault(self.ladder.columns[column].modes, []).append(column)
+        if not open_bodies(self.grid.scene.study):
+            self.floor |= dict.fromkeys(own, self._as_fixed(name, own))
+            return
         if name != self.grid.scene.numerics.fidelity:
             modes = next((count for count in families if count >= JUDGED_BY), max(families))
             everywhere = self._floor(families[modes][-1], everywhere) <= HOPELESS * self.span[1]
@@ -145,6 +154,16 @@ class Climb:
             enough = np.where((floor <= ENOUGH * self.span[0]) & ~np.isfinite(enough), count, enough)
             self.floor |= dict.fromkeys(columns, floor)
         self.enough[name] = enough
+
+    def _as_fixed(self, name: str, columns: list[int]) -> Array:
+        """(P,) what modes that a study fixes leave of what is wanted of them: nothing, and a simpler model by the last
+        scheme, or by the first where the highest of the modes would ask that for more work than the reference."""
+        if name == self.grid.scene.numerics.fidelity:
+            for column in self.rungs.levels:
+                self._take(self.rungs.marched(np.flatnonzero(self.rungs.known(column)), column))
+            return np.zeros(self.values.size)
+        floor = self._floor(columns[-1], np.ones(self.values.size, dtype=np.bool_))
+        return np.minimum(floor, self._floor(columns[0], ~np.isfinite(floor)))
 
     def _floor(self, column: int, fits: NDArray[np.bool_]) -> Array:
         """(P,) what a column leaves with so many steps that its modes and its model alone do; infinite where these

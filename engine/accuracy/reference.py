@@ -155,7 +155,9 @@ def converge(
     decisive = deciding(results, asked.study.solver.tolerance)
     march = partial(_march, marches, share, seen=seen)
     pushes_along = any("along" in carriage.pushes for carriage in asked.study.carriage.values())
-    is_corrected = levels.numerics[0].static_correction
+    is_corrected, modes = levels.numerics[0].static_correction, grid.model(levels.numerics[0]).body_modes
+    slow = np.array([result.slow for result in results])
+    least = np.where(slow, MOST_LEFT, LEAST_LEFT)[:, None]
     now, spent = march(np.arange(values.size), 0)
     found = Converged(
         now,
@@ -175,7 +177,10 @@ def converge(
         now, spent = march(active, level)
         model = grid.model(levels.numerics[level])
         apart = differences(asked, model, own, found.outcome.of(active), now)
-        remaining = left_over(apart, change[:, active])
+        remaining = left_over(apart, change[:, active], least)
+        if model.body_modes == modes:  # by which these converge: no smaller by steps alone
+            remaining[slow] = np.maximum(remaining[slow], found.error[slow][:, active])
+        modes = model.body_modes
         if pushes_along and not (is_corrected and level == 1):
             stays = STAYS if is_corrected else STAYS_UNCORRECTED
             remaining = np.maximum(remaining, left_along(apart, change[:, active], stays))
@@ -200,13 +205,14 @@ def _is_dear(grid: SceneGrid, values: VariantValues, levels: Levels, level: int,
     return passages(grid) * level_work(grid, values, levels, level) > dear
 
 
-def left_over(change: Array, before: Array) -> Array:
-    """(R, V) the error of a level from the change that led to it, and the one before that (NaN where there is none)."""
+def left_over(change: Array, before: Array, least: Array | float = LEAST_LEFT) -> Array:
+    """(R, V) the error of a level from the change that led to it, and the one before that (NaN where there is none), at
+    least so many times the change."""
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = np.clip(change / before, 0.0, 0.99)
     foretold = ratio / (1.0 - ratio)
-    foretold = np.clip(np.maximum(foretold, np.minimum(CAUTION * foretold, 1.0)), LEAST_LEFT, MOST_LEFT)
-    known = np.where(np.isfinite(ratio), foretold, FIRST_LEFT)
+    foretold = np.clip(np.maximum(foretold, np.minimum(CAUTION * foretold, 1.0)), least, MOST_LEFT)
+    known = np.where(np.isfinite(ratio), foretold, np.maximum(FIRST_LEFT, least))
     return np.where(np.isinf(change), np.nan, change * known)
 
 

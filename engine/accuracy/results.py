@@ -35,12 +35,14 @@ ENDS = ("max", "min")
 
 class Result(NamedTuple):
     """A reported number. of: the sensor, carriage or envelope that it is read of. tolerance: that of its own, NaN where
-    its error is only told; follows: whether it is `solver.tolerance`, which a sweep may set."""
+    its error is only told; follows: whether it is `solver.tolerance`, which a sweep may set; slow: whether its error
+    falls only by the number of modes, or slower still."""
 
     name: str
     of: str
     tolerance: float = np.nan
     follows: bool = False
+    slow: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,9 +153,10 @@ def _of_accelerations(asked: Asked) -> Iterator[Entry]:
 
 
 def _of_contact_forces(asked: Asked) -> Iterator[Entry]:
+    slow = asked.at_once and asked.unsprung  # of a mass m that comes at once m_N/(m + m_N), m_N that of N modes there
     for c, name in enumerate(asked.study.carriage):
         for own in (f"{name}_contact_force_{end}" for end in ENDS):
-            yield Result(own, name), partial(Pair.contact_force, name=own, carriage=c)
+            yield Result(own, name, slow=slow), partial(Pair.contact_force, name=own, carriage=c)
         own = f"{name}_contact_force_min_position"
         yield Result(own, name), partial(Pair.place, name=own)
 

@@ -11,6 +11,7 @@ from engine.accuracy.results import differences, results_of
 from engine.batch.execution import execute
 from engine.batch.executors import Shared, Threads
 from engine.batch.plan import Plan, make_plan
+from engine.bodies.modal.description import MAX_MODES
 from engine.march.outcome import Flat
 from engine.scene.study import Study
 from results_schema.arrays import Array
@@ -40,6 +41,7 @@ STUDIES: dict[str, Study] = {
     "tight": sweep(2e-3),
     "wide": sweep(5e-2),
     "swept tolerance": sweep(sweep=SPEEDS | WEIGHTS | {"wanted": {"of": TOLERANCE, "values": [2e-3, 1e-2, 5e-2]}}),
+    "more modes than its steps need": sweep(bed=beam(modes=MAX_MODES, damping_ratio=0.02)),
     "lengths": sweep(sweep=LENGTHS | SPEEDS | WEIGHTS, sensor={"quarter": fixed(0.25)}),
     "told only": sweep(sensor=midspan("told")),
     "told only, out of reach": sweep(1e-9, sensor=midspan("told"), bed=beam(modes=3)),

@@ -127,7 +127,7 @@ def test_the_choice_follows_from_the_study_alone(chunk: int, threads: int) -> No
         assert other.arrays[name].tobytes() == array.tobytes(), name
 
 
-@pytest.mark.parametrize("name", ["passages", "tight", "wide", "lengths"])
+@pytest.mark.parametrize("name", ["passages", "tight", "wide", "lengths", "more modes than its steps need"])
 def test_what_is_chosen_holds_the_tolerance(name: str) -> None:
     """Of nearly all variants, and what is told is no less than what is observed."""
     run, off = run_of(name), observed(name)

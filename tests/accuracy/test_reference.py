@@ -240,6 +240,20 @@ def test_what_forces_along_a_track_leave_is_told_with_the_modes_that_matter_miss
     assert np.isnan(left_along(np.array([0.2]), np.array([np.nan]), stays)).all()
 
 
+@pytest.mark.fault
+@pytest.mark.parametrize("modes", [8, 16, 32, MAX_MODES])
+def test_a_mass_that_is_let_go_touches_with_what_its_modes_weigh_there(modes: int) -> None:
+    """g m m_N/(m + m_N) with 1/m_N = sum of phi_n(x)^2/M_n: nothing with all modes, so that all of it is the error."""
+    weight, place = 0.2 * 9.81, 0.2
+    scene = study(beam(modes=modes), mass(0.2, cruise(place, 0.8, 0.3)), initial="rest", solver={"tolerance": 1e-2})
+    found = studies.run(scene)
+    shapes = 2.0 * np.sin(np.arange(1, modes + 1) * np.pi * place) ** 2
+    least = float(found.car_contact_force_min)
+    assert least == pytest.approx(weight / (1.0 + 0.2 * shapes.sum()), rel=1e-9)
+    error = float(found.estimated_error.sel(result="car_contact_force_min"))
+    assert np.isnan(error) if modes == MAX_MODES else least / weight <= error <= 5.0 * least / weight
+
+
 def test_levels_have_more_and_more_of_the_modes_that_loads_excite() -> None:
     """A portal so slender across its plane that its first dozen modes sway and twist there, beside 60 modes; a beam,
     all of whose modes are excited."""
