@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fnmatch
 import json
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ from results_schema.errors import BadInput, shortened
 CHECKED_ONE_BY_ONE = 1000  # longer lists of plain numbers are checked at their ends: every field's limits are intervals
 SOBOL_SEED = 0
 DRAWN_AT_ONCE = 2**20
+DIGITS, ROUNDINGS = 12, 4.0  # of a number that people type, by which a value of equal spacing may miss it
 
 Number = int | float
 Values = NDArray[Any]
@@ -62,8 +64,22 @@ def ranged(study: Study, name: str, axis: SweepAxis) -> Values:
         if np.abs(values - rounded).max() > 1e-9 * max(1.0, np.abs(values).max()):
             odd = f"{values[np.abs(values - rounded).argmax()]:g}"
             raise _bad(study, f"{name}.count", "the axis counts, and this gives fractions", "whole numbers", odd)
-        values = rounded.astype(np.int64)
+        return rounded.astype(np.int64)
+    if axis.spacing == "linear":
+        values[1:-1] = decimal(values)[1:-1]
     return values
+
+
+def decimal(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values (V,), those within some roundings of a number of twelve digits as that number: what people type in turn
+    to find them.
+
+    >>> np.linspace(0.3, 1.5, 5)[2], decimal(np.linspace(0.3, 1.5, 5))[2]
+    (np.float64(0.8999999999999999), np.float64(0.9))
+    """
+    largest = float(np.abs(values).max()) or 1.0
+    near = np.round(values, DIGITS - 1 - math.floor(math.log10(largest)))
+    return np.where(np.abs(near - values) <= ROUNDINGS * np.spacing(largest), near, values)
 
 
 def sampled(study: Study, name: str, axis: SweepAxis, parts: NDArray[np.float64]) -> Values:

@@ -24,7 +24,7 @@ OF_RAILS = ("deflection_largest", "stress_largest")
 
 def errors(dataset: xr.Dataset) -> xr.Dataset:
     """The estimated error of every result of a study's dataset, in the result's own unit: variables of the same names
-    over the same sweep (and sensors), NaN where no estimate exists. Raises BadInput where the dataset is none of a
+    over the same sweep (and sensors), NaN where no estimate or no result exists. Raises BadInput where the dataset is none of a
     study."""
     results, found = Results.of(dataset), dict[str, list[xr.DataArray]]()
     if "estimated_error" not in results.dataset or not results.study.output.keeps_variants:
@@ -32,7 +32,8 @@ def errors(dataset: xr.Dataset) -> xr.Dataset:
     for name, sensor, array in single_numbers(results.dataset):
         if set(array.dims) == set(results.dims) and f"{name} {sensor}".strip() in results.dataset["result"].values:
             attributes = {"long_name": f"estimated error of {name}", "units": _unit(results, array, sensor)}
-            own = array.transpose(*results.dims).copy(data=absolute_errors(results, name, sensor))
+            values = array.transpose(*results.dims)
+            own = values.copy(data=absolute_errors(results, name, sensor)).where(values.notnull())
             found.setdefault(name, []).append(own.assign_attrs(attributes))
     return xr.Dataset({name: _joined(results.dataset[name], parts) for name, parts in found.items()})
 

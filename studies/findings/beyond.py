@@ -180,6 +180,8 @@ def where_beyond(results: Results, values: Array, threshold: float, axis: Axis |
     """In which part of the sweep values (in its shape) exceed a threshold: along one swept number, for each value of
     another where these are few; without one in how many variants."""
     beyond = np.nan_to_num(np.where(results.with_values, values, np.nan)) > threshold
+    if not beyond.any() and sum(one.values.size > 1 for one in results.axes) > 1:
+        return "nowhere in the sweep"
     if axis is not None and VARIANT in results.dims and _has_samples(results, axis):
         return _in_parts(results, axis, beyond)
     if axis is None or axis.dim == VARIANT:

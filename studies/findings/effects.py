@@ -70,7 +70,7 @@ def told_effects(results: Results, values: Array, what: str, error: Array | floa
     own = [axis for axis in own if (lines[axis][0] > 0.0).all()]
     own.sort(key=lambda axis: -float(lines[axis][0].max() / lines[axis][0].min()))
     told = [_effect(axis, *lines[axis]) for axis in own]
-    return f"Over all else that is swept, {what} {listed(told)}." if told else ""
+    return f"With the worst of all else that is swept, {what} {listed(told)}." if told else ""
 
 
 class BothWays(NamedTuple):

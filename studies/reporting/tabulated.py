@@ -135,6 +135,8 @@ def _chosen(results: Results, names: Sequence[str]) -> xr.Dataset:
     for name in names:
         if name not in known:
             remedy = did_you_mean(name, known)
+            if name in dataset.dims:
+                remedy = "leave it out: swept numbers are always in the table, beside the results that are named"
             expected = f"one of {len(known)} results, which info --all lists"
             raise BadInput("no such result", where="results", expected=expected, received=name, remedy=remedy)
     kept = {*names, *(axis.name for axis in results.axes), *dataset.dims, "status"}

@@ -216,7 +216,7 @@ def test_a_sway_before_the_first_mode_that_bends_has_no_theory_of_its_lag() -> N
 @pytest.mark.parametrize(
     ("first", "second", "words"),
     [
-        ([1.0, 1.1, 1.0, 1.1, 1.0, 1.0], [1.0] * 6, "nowhere from 1 to 6 m/s."),
+        ([1.0, 1.1, 1.0, 1.1, 1.0, 1.0], [1.0] * 6, "nowhere in the sweep."),
         ([1.2] * 6, [1.3] * 6, "everywhere from 1 to 6 m/s."),
         ([1.2] * 6, [1.0] * 6, "everywhere from 1 to 6 m/s (zeta 0.01); nowhere from 1 to 6 m/s (zeta 0.05)."),
         (

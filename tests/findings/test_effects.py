@@ -72,7 +72,7 @@ def test_each_number_is_told_by_itself() -> None:
     crawl = 'pace = { of = "carriage.table.motion.speed", from = 0.02, to = 0.04, count = 3 }'
     results = Results.of(scenes.run("passage", f"{crawl}\n{MASS}\n{DEAD}", extra=ELSEWHERE))
     said = told_effects(results, sizes(results, "midspan"), "it")
-    assert said.startswith("Over all else that is swept, it ")
+    assert said.startswith("With the worst of all else that is swept, it ")
     assert "grows 4 times over mass 50 to 200 kg" in said and "stays the same over place 1 to 2 m" in said
     assert answers.answer(results.dataset)[0].endswith(told_effects(results, sizes(results, "midspan"), IT))
 
@@ -84,7 +84,7 @@ def test_the_largest_over_all_others_counts() -> None:
     values[3] = 2.0, 5.0, 4.0  # masses 200, 50 and 100 kg
     said = told_effects(results, values, "it")
     assert said == (
-        "Over all else that is swept, it grows 5 times over pace 1 to 8 m/s and falls to 1/2.5 over mass 50 to 200 kg."
+        "With the worst of all else that is swept, it grows 5 times over pace 1 to 8 m/s and falls to 1/2.5 over mass 50 to 200 kg."
     )
     values[0] = 5.0, 0.0, 0.0
     assert "changes by up to 25 % over mass" in told_effects(results, values, "it")
@@ -112,7 +112,7 @@ def test_where_a_contact_opens_what_is_largest_is_not_known(place: int) -> None:
 def test_a_number_at_which_all_is_zero_is_not_compared() -> None:
     results = Results.of(scenes.run("passage", f"{scenes.pace('passage')}\n{MASS}"))
     values = np.outer(np.ones(4), [2.0, 0.0, 1.0])
-    assert told_effects(results, values, "it") == "Over all else that is swept, it stays the same over pace 1 to 8 m/s."
+    assert told_effects(results, values, "it") == "With the worst of all else that is swept, it stays the same over pace 1 to 8 m/s."
 
 
 def test_one_number_or_a_sample_has_no_effects_of_its_own() -> None:

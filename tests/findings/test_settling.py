@@ -61,7 +61,7 @@ def test_the_best_motion_is_told_for_each_mass_and_way_at_the_worst_damping() ->
         end = ", an end of the swept acceleration" * (step in (0, 4))
         words.append(f"{worst[step]:.3g} s at acceleration {STEPS[step]} m/s²{end} ({where})")
     assert f"move and settling take at least {listed(words)}, at the worst zeta" in plain
-    told = swings.partition("Over all else that is swept, the largest such swing ")[2]
+    told = swings.partition("With the worst of all else that is swept, the largest such swing ")[2]
     swing = found.midspan_residual.transpose(*dims).values
     ratio = {
         dim: (most := swing.max(axis=tuple(n for n in range(4) if n != place))).max() / most.min()

@@ -53,6 +53,20 @@ def test_grid() -> None:
         assert not variant.sweep.axes
 
 
+def test_equal_spacing_meets_the_numbers_that_people_type() -> None:
+    """So that they find them in a dataset; what has no few digits, ends and proportional spacing stay as they are."""
+    found = sweep(
+        "\n".join(
+            [axis("a", SPEED, "from = 0.3, to = 1.5, count = 13"), axis("b", MASS, "from = 1, to = 2, count = 4")]
+        )
+    )
+    speeds, masses = (found.axes[place].values for place in (0, 1))
+    assert speeds.tolist() == [0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5]
+    assert masses.tolist() == np.linspace(1.0, 2.0, 4).tolist()
+    far = sweep(axis("a", SPEED, 'from = 1e-3, to = 10, count = 7, spacing = "log"')).axes[0].values
+    assert far.tolist() == np.geomspace(1e-3, 10.0, 7).tolist()
+
+
 def test_no_sweep() -> None:
     cases = expand(load(MINIMAL))
     assert (cases.dims, cases.shape, cases.size, cases.paths) == ((), (), 1, ())
