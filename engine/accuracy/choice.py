@@ -26,12 +26,12 @@ from engine.accuracy.neighbour_errors import (
     nearest_others,
     neighbour_errors_of,
 )
-from engine.accuracy.results import Result, results_of
+from engine.accuracy.results import Result, deciding, results_of, worst_held
 from engine.kernels.nearest_pilots import cheapest, nearest
 from engine.march.outcome import Asked
-from engine.scene.sweep import Cases
+from engine.scene.sweep import Axis, Cases
 from engine.scene.variants import TOLERANCE, VariantValues, axes_of_scene, cases_tolerance
-from results_schema.arrays import Array, Counts
+from results_schema.arrays import Array, Counts, Mask
 
 SEED = 20261122  # of the pilots; audits have another
 PILOTS = 256  # 64 needed 2.7 times the least work for 208 passages at 1e-3, 256 took 2.0 times
@@ -45,6 +45,7 @@ NEIGHBOURS = 10
 # What is said of the next three was measured on `asymmetry`, `double-peak` and 10,000 passages, with 128 to 256 pilots,
 # by the largest error of 6 neighbours.
 LEAST_WEIGHT = 0.02  # of the largest weight of an axis: none is left out; 0.005 to 0.1 chose alike
+APART = 1e6  # times the largest weight: of 64 modes 63 are farther than all that have 64
 NEAR_PAIRS = 12  # pairs of near pilots per pilot that tell the weights: 6 to 40 took 0.7 to 1 times the work
 SWEEPS = 50  # over the weights: scipy's to eight digits, but for axes that tell the same twice
 
@@ -187,6 +188,7 @@ class _Neighbours(NamedTuple):
     asked: Asked
     cases: Cases
     order: Counts
+    sorts: Counts
     weights: Array
     foreseen: Cheapest
 
@@ -196,6 +198,8 @@ class _Neighbours(NamedTuple):
         own = VariantValues.of(self.asked.study, self.cases, part)
         places = coordinates(self.cases, part) * self.weights
         nearest(places, self.foreseen.errors.pilots, neighbours)
+        first = neighbours[:, :1]
+        neighbours = np.where(self.sorts[neighbours] == self.sorts[first], neighbours, first)
         inside = np.flatnonzero((self.order >= part[0]) & (self.order <= part[-1]))
         neighbours[self.order[inside] - part[0]] = inside[:, None]  # pilots know their own errors
         rung = self.foreseen.of(places, neighbours, own.tighter)
@@ -206,7 +210,7 @@ def choose(of: Pilots, found: Found, share: Share) -> Choice:
     """The choice for all variants of a sweep by what its pilots found. Raises Halted."""
     (scene, order, measured), cases = found, of.cases
     along = coordinates(cases, order)
-    places = Places(along, _weights(along, measured))
+    places = Places(along, _weights(along, measured, sets_modes(cases)))
     others, held = nearest_others(places.weighted, NEIGHBOURS), measured.held.reshape(-1, order.size)
     foreseen = Cheapest.by(neighbour_errors_of(of.asked, measured, places, others, of.span), of.cost(scene), held)
     known = foreseen
@@ -216,7 +220,7 @@ def choose(of: Pilots, found: Found, share: Share) -> Choice:
     rung = np.empty(cases.size, dtype=np.int32)
     neighbours = np.empty((cases.size, min(NEIGHBOURS, order.size)), dtype=_number_type(order.size))
     rows = np.array_split(np.arange(cases.size), -(-cases.size // AT_ONCE))
-    subject = _Neighbours(of.asked, cases, order, places.weights, foreseen)
+    subject = _Neighbours(of.asked, cases, order, _sorts(of, found, along), places.weights, foreseen)
     for part, near, chosen in share(subject, [Job(_Neighbours.of, row) for row in rows]):
         neighbours[part[0] : part[-1] + 1], rung[part[0] : part[-1] + 1] = near, chosen
     ladder, results = of.ladder(scene), results_of(of.asked)
@@ -306,16 +310,41 @@ def coordinates(cases: Cases, variants: Counts) -> Array:
     sweeps took 1.4 times the work, and 1.2 % of displacements missed in place of 0.8."""
     positions = cases.positions(variants)
     columns = []
-    for axis in axes_of_scene(cases):
+    for axis in _varied(cases):
         low, high = axis.root_ends
-        if low < high:
-            roots = np.cbrt(np.asarray(axis.values[positions[axis.dim]], dtype=np.float64))
-            columns.append((roots - low) / (high - low))
+        roots = np.cbrt(np.asarray(axis.values[positions[axis.dim]], dtype=np.float64))
+        columns.append((roots - low) / (high - low))
     return np.stack(columns, axis=1) if columns else np.zeros((variants.size, 1))
 
 
-def _weights(points: Array, measured: Measured) -> Array:
-    """(D,) how much each axis counts: squares of differences in the logarithm of errors between near pilots, as sums of
+def _varied(cases: Cases) -> list[Axis]:
+    """The axes along which places of variants differ."""
+    return [axis for axis in axes_of_scene(cases) if axis.root_ends[0] < axis.root_ends[1]]
+
+
+def sets_modes(cases: Cases) -> Mask:
+    """(D,) which axes of places fix a number of modes: with another one a rung is another march."""
+    found = [any(path.endswith(".modes") for path in axis.paths) for axis in _varied(cases)]
+    return np.array(found or [False])
+
+
+def _sorts(of: Pilots, found: Found, along: Array) -> Counts:
+    """(P,) which pilots tell together: those of the same fixed modes, and apart from these those whose reference did
+    not converge, of which nothing is known (as of one speed, a hundredth of the others, for all of these)."""
+    results = deciding(results_of(of.asked), of.asked.study.solver.tolerance)
+    unknown = np.isnan(worst_held(found.measured.reference, results))
+    labels = np.column_stack([along[:, sets_modes(of.cases)], unknown])
+    return np.asarray(np.unique(labels, axis=0, return_inverse=True)[1].reshape(-1), dtype=np.int64)
+
+
+def _weights(points: Array, measured: Measured, apart_along: Mask) -> Array:
+    """(D,) how much each axis counts, so much along some that what differs there is farthest."""
+    found = _weights_by_errors(points, measured)
+    return np.where(apart_along, APART * found.max(), found)
+
+
+def _weights_by_errors(points: Array, measured: Measured) -> Array:
+    """(D,) the same without these: squares of differences in the logarithm of errors between near pilots, as sums of
     weighted squares of their distances along the axes, by least squares without negative weights."""
     held = measured.held[measured.marched]
     logs = np.log(np.clip(held, *TELLING))

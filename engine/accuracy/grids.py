@@ -107,13 +107,13 @@ class SceneGrid:
     def chooses(self) -> bool:
         """Whether the study leaves model, modes or scheme open."""
         solver = self.asked.study.solver
-        return bool(open_bodies(self.asked.study)) or solver.fidelity == "auto" or solver.scheme == "auto"
+        return bool(open_bodies(self.scene.study)) or solver.fidelity == "auto" or solver.scheme == "auto"
 
     @cached_property
     def mode_levels(self) -> tuple[int, ...]:
         """Numbers of modes of bodies that leave them open, each with twice as many that loads excite as the one before:
         a frame may have none of these among its first dozen."""
-        names = open_bodies(self.asked.study)
+        names = open_bodies(self.scene.study)
         parts = [part for part in self.scene.bodies if part.name in names]
         rigid = max((part.modal.rigid_modes for part in parts), default=0)
         usual = tuple(modes for modes in MODES if modes > rigid + 1)
@@ -195,7 +195,7 @@ def swift_scheme_fits(grid: SceneGrid) -> bool:
     wants a scheme without a limit."""
     if not any(vibrates_freely(carriage) for carriage in grid.scene.carriages):
         return True
-    fewest = grid.mode_levels[0] if open_bodies(grid.asked.study) else 0
+    fewest = grid.mode_levels[0] if open_bodies(grid.scene.study) else 0
     return are_soft(grid.model(grid.scene.numerics._replace(modes=fewest)), grid.values)
 
 

@@ -51,7 +51,7 @@ def ladder_of(asked: Asked, grid: SceneGrid) -> Ladder:
     if grid.common is not None:
         return Ladder(grid.common, (1,) if grid.fixed else CUTS)
     study, says = asked.study, grid.scene.numerics
-    names = open_bodies(study)
+    names = open_bodies(grid.scene.study)
     rigid = max((part.modal.rigid_modes for part in grid.scene.bodies if part.name in names), default=0)
     modes = [count for count in MODES if count > rigid] if names else [0]
     schemes = [says.scheme]

@@ -101,10 +101,10 @@ def neighbour_errors_of(
     left_out = _LeftOut(measured, others, telling)
     margin, worst_margin = left_out.margins(whole, _levels(told_slopes, places, whole.shape))
     margin = np.where(np.isfinite(tolerances(decisive)), worst_margin, margin)
-    error = np.asarray(margin * measured.error + measured.reference.T[measured.pilot])
+    error = _beside_references(measured, margin, measured.reference.T)
     planes = _levels(held_slopes, places, whole.shape)
     if measured.free:  # what is told, but for what elements leave, is what decides
-        wanting = margin * measured.error + _settled(measured, decisive, span[0])[measured.pilot]
+        wanting = _beside_references(measured, margin, _settled(measured, decisive, span[0]))
         held, wanted = (
             _by_rung([worst_held(e.T, part)[measured.march] for part in parts], planes) for e in (error, wanting)
         )
@@ -115,6 +115,12 @@ def neighbour_errors_of(
         held = wanted = _by_rung(both, planes)
     by_elements = left_out.with_margins(measured.by_elements)
     return NeighbourErrors(places.weighted, error, held, wanted, told_slopes, held_slopes, by_elements)
+
+
+def _beside_references(measured: Measured, margin: Array, reference: Array) -> Array:
+    """(M, R) errors of marches with a margin and that of their pilots' references (P, R); infinite where none was
+    marched, whatever is known of the references."""
+    return np.where(np.isinf(measured.error), np.inf, margin * measured.error + reference[measured.pilot])
 
 
 def slopes(errors: Array, places: Places, telling: tuple[float, float]) -> Array:

@@ -24,8 +24,8 @@ OF_RAILS = ("deflection_largest", "stress_largest")
 
 def errors(dataset: xr.Dataset) -> xr.Dataset:
     """The estimated error of every result of a study's dataset, in the result's own unit: variables of the same names
-    over the same sweep (and sensors), NaN where no estimate or no result exists. Raises BadInput where the dataset is none of a
-    study."""
+    over the same sweep (and sensors), NaN where no estimate or no result exists. Raises BadInput where the dataset is
+    none of a study."""
     results, found = Results.of(dataset), dict[str, list[xr.DataArray]]()
     if "estimated_error" not in results.dataset or not results.study.output.keeps_variants:
         return xr.Dataset(attrs={"title": "no estimates of errors"})
@@ -101,6 +101,8 @@ def _scales(results: Results, name: str, sensor: str) -> tuple[Any, Any]:
         return np.nan, _largest([results.of_sensor(one, sensor) for one in OF_TOOLS])
     if name in OF_RAILS:
         return np.nan, results.of_sensor(name, sensor)
+    if name == DYNAMIC_AMPLIFICATION and _is_pushed(results, sensor):
+        return 1.0, results.of_sensor(name, sensor)
     if name == "lag":
         return _cruise(results), np.nan
     if name.endswith(("_settling_time", "_move_and_settle_time")):
@@ -115,8 +117,8 @@ def _scales_of_ends(results: Results, stem: str, own: xr.DataArray) -> tuple[Any
     moves = kind_named(results.study.kind).moves_frames
     if stem in results.sensors and "dynamic_amplification" in results.dataset:
         static = own / results.of_sensor("dynamic_amplification", stem)
-        known, body = np.isfinite(static), results.study.body_of(stem)
-        if any("along" in carriage.pushes and carriage.on == body for carriage in results.study.carriage.values()):
+        known = np.isfinite(static)
+        if _is_pushed(results, stem):
             return static.where(known), own
         return static.where(known), own.where(~known)
     whole = stem.removesuffix(AFTER_STOP)
@@ -130,6 +132,12 @@ def _scales_of_ends(results: Results, stem: str, own: xr.DataArray) -> tuple[Any
         track = results.models.get(results.study.carriage[carriage].on)
         return (np.nan if track is None else float(track["length"])), np.nan
     return np.nan, own
+
+
+def _is_pushed(results: Results, sensor: str) -> bool:
+    """Whether a carriage pushes a sensor's body along its track: its errors are over its own largest value then."""
+    body = results.study.body_of(sensor)
+    return any("along" in carriage.pushes and carriage.on == body for carriage in results.study.carriage.values())
 
 
 def _largest(parts: list[xr.DataArray]) -> xr.DataArray:

@@ -84,7 +84,8 @@ def test_the_largest_over_all_others_counts() -> None:
     values[3] = 2.0, 5.0, 4.0  # masses 200, 50 and 100 kg
     said = told_effects(results, values, "it")
     assert said == (
-        "With the worst of all else that is swept, it grows 5 times over pace 1 to 8 m/s and falls to 1/2.5 over mass 50 to 200 kg."
+        "With the worst of all else that is swept, it grows 5 times over pace 1 to 8 m/s and falls to 1/2.5 over mass "
+        "50 to 200 kg."
     )
     values[0] = 5.0, 0.0, 0.0
     assert "changes by up to 25 % over mass" in told_effects(results, values, "it")
@@ -112,7 +113,10 @@ def test_where_a_contact_opens_what_is_largest_is_not_known(place: int) -> None:
 def test_a_number_at_which_all_is_zero_is_not_compared() -> None:
     results = Results.of(scenes.run("passage", f"{scenes.pace('passage')}\n{MASS}"))
     values = np.outer(np.ones(4), [2.0, 0.0, 1.0])
-    assert told_effects(results, values, "it") == "With the worst of all else that is swept, it stays the same over pace 1 to 8 m/s."
+    assert (
+        told_effects(results, values, "it")
+        == "With the worst of all else that is swept, it stays the same over pace 1 to 8 m/s."
+    )
 
 
 def test_one_number_or_a_sample_has_no_effects_of_its_own() -> None:
