@@ -107,10 +107,15 @@ def as_fixed(grid: SceneGrid) -> Levels:
 
 
 def _scheme(grid: SceneGrid) -> Scheme:
-    """Fox-Goodwin where the modes grow with the levels; the limit of the highest of modes that a study fixes, most of
-    which hardly move, would ask for far more steps than average acceleration needs."""
-    fits = bool(open_bodies(grid.scene.study)) and swift_scheme_fits(grid)
-    return FOX_GOODWIN if fits else AVERAGE_ACCELERATION
+    """Fox-Goodwin where the modes begin few; the limit of many that a study fixes, most of which hardly move, asks for
+    more steps than average acceleration takes at the level to which most go."""
+    if not swift_scheme_fits(grid):
+        return AVERAGE_ACCELERATION
+    if open_bodies(grid.scene.study):
+        return FOX_GOODWIN
+    model = grid.model(grid.scene.numerics._replace(scheme=FOX_GOODWIN))
+    usual = FIRST_PERIODS * 4.0**USUAL_LEVEL * grid.values.scene_time_scale * model.first_omega / (2.0 * np.pi)
+    return FOX_GOODWIN if np.all(least_steps(model, grid.values) <= usual) else AVERAGE_ACCELERATION
 
 
 def is_free(grid: SceneGrid) -> bool:

@@ -50,7 +50,7 @@ def quasistatic_extremes(
     shown = sensors if sampled is None else sampled
     history = np.zeros((counts.size, shown, size))
     if counts.size:
-        here = _counted(tables, signals[:shown], standing(tables.timeline, counts))[:, :, None]
+        here = _sampled(tables, signals[:shown], counts)[:, :, None]
         found = np.einsum("sjl,lv->sjv", _unit(tables, counts)[:, :shown], loads)
         history = np.where(here, found, np.nan)
     resting = statistics[:0]
@@ -75,6 +75,17 @@ def _counted(tables: SceneTables, signals: tuple[Signal, ...], along: Along) -> 
         here = None if rider is None else along[rider].here
         found.append(counts if here is None else counts & here)
     return np.stack(found, axis=1)
+
+
+def _sampled(tables: SceneTables, signals: tuple[Signal, ...], counts: Counts) -> Mask:
+    """(S, J) where histories have each signal: as those of marches not of what leaves at that station."""
+    found = _counted(tables, signals, standing(tables.timeline, counts))
+    for column, signal in enumerate(signals):
+        rider, segments = signal.rides(tables.model), tables.timeline.segments
+        if rider is not None:
+            left = [segment.first for segment in segments if segment.recorded and not segment.active[rider]]
+            found[np.isin(counts, left), column] = False
+    return found
 
 
 def _statistics(readings: Array, counted: Mask, at: Array) -> Array:
