@@ -16,7 +16,7 @@ from engine.march.outcome import Flat
 from engine.scene.study import Study
 from results_schema.arrays import Array
 from results_schema.store.rows import Collector
-from tests.accuracy.passages import SPEED, WEIGHT, axis, passages
+from tests.accuracy.passages import OPEN, SPEED, WEIGHT, axis, passages
 from tests.engine.build import Table, beam, fixed
 
 TOLERANCE = "solver.tolerance"
@@ -42,6 +42,10 @@ STUDIES: dict[str, Study] = {
     "wide": sweep(5e-2),
     "swept tolerance": sweep(sweep=SPEEDS | WEIGHTS | {"wanted": {"of": TOLERANCE, "values": [2e-3, 1e-2, 5e-2]}}),
     "more modes than its steps need": sweep(bed=beam(modes=MAX_MODES, damping_ratio=0.02)),
+    "numbers of modes": sweep(
+        bed=OPEN,
+        sweep=SPEEDS | WEIGHTS | {"kept": {"of": "body.bed.modes", "values": [4, 8, MAX_MODES]}},
+    ),
     "lengths": sweep(sweep=LENGTHS | SPEEDS | WEIGHTS, sensor={"quarter": fixed(0.25)}),
     "told only": sweep(sensor=midspan("told")),
     "told only, out of reach": sweep(1e-9, sensor=midspan("told"), bed=beam(modes=3)),

@@ -151,6 +151,19 @@ def test_references_that_do_not_settle_are_told_but_do_not_decide(reference: flo
     np.testing.assert_allclose(held_by(found), 0.1 + reference, rtol=1e-12)
 
 
+@pytest.mark.fault
+@pytest.mark.parametrize("free", [True, False])
+def test_rungs_that_none_marched_hold_nothing_whatever_the_first_reference_is(free: bool) -> None:
+    """Rungs point to a blank march of the first pilot: where its reference did not converge they seemed to be exact."""
+    given = measured(np.full(COUNT, 0.1 * TOLERANCE))
+    given.reference[:, 0] = np.nan
+    march, held = given.march.copy(), given.held.copy()
+    march[:, :, 20:], held[:, :, 20:] = 0, np.inf
+    found = told_by(replace(given, march=march, held=held, free=free))
+    assert np.isposinf(found.wanted[20:, 0]).all() and np.isposinf(found.error[0]).all()
+    assert np.isfinite(found.wanted[1:20, 0]).all()
+
+
 def test_what_the_study_fixes_makes_nothing_dearer() -> None:
     given = replace(measured(np.full(COUNT, 0.1 * TOLERANCE), 0.2 * TOLERANCE), free=False)
     found = told_by(given)

@@ -68,6 +68,9 @@ def test_errors_of_a_body_that_is_pushed_are_over_the_largest_value() -> None:
     assert np.all(results.numbers("dynamic_amplification", "sway") > 2.0)
     told = absolute_errors(with_error(results, "sway_max", 0.25), "sway_max")
     np.testing.assert_allclose(told, 0.25 * own / 0.75, rtol=1e-6)
+    many = "dynamic_amplification"
+    told = absolute_errors(with_error(results, f"{many} sway", 0.25), many, "sway")
+    np.testing.assert_allclose(told, 0.25 * results.numbers(many, "sway") / 0.75, rtol=1e-6)
 
 
 def test_no_answer_compares_sway_by_braking_with_what_weights_alone_make() -> None:

@@ -10,7 +10,7 @@ import studies
 from engine.batch.plan import make_plan
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity
-from tests.engine.build import Table, beam, cruise, fixed, force, mass, oscillator, shuttle, study, swing, under
+from tests.engine.build import Table, aboard, beam, cruise, fixed, force, mass, oscillator, shuttle, study, swing, under
 
 STATIC: Table = {"solver": {"fidelity": "static"}}
 
@@ -28,6 +28,18 @@ def test_a_force_on_a_pinned_beam() -> None:
     assert int(found.fidelity_used) == Fidelity.STATIC and int(found.steps_used) == 0
     square = np.mean([_midspan(s) ** 2 for s in (np.arange(20000) + 0.5) / 20000]) / 1.5
     assert float(found.midspan_rms) == pytest.approx(np.sqrt(square), rel=1e-3)
+
+
+@pytest.mark.fault
+@pytest.mark.parametrize("after", [0.0, 0.7])
+def test_histories_end_where_those_of_marches_do(after: float) -> None:
+    """That of what leaves: one number more, and no error of the history could be told."""
+    sensors = {"below": under("car"), "aboard": aboard("car")}
+    car = oscillator(0.5, 40.0, cruise(0.1, 0.9, 0.8, after=after))
+    found = studies.run(study(beam(modes=2), car, sensor=sensors, output={"histories": "all"}, **STATIC))
+    for name in sensors:
+        assert np.isfinite(float(found.estimated_error.sel(result=name))), name
+        assert np.isnan(found[name].values).any() == (after > 0.0)
 
 
 def _midspan(s: float) -> float:
