@@ -26,6 +26,7 @@ from engine.accuracy.neighbour_errors import (
     nearest_others,
     neighbour_errors_of,
 )
+from engine.accuracy.reference import DOUBTED
 from engine.accuracy.results import Result, deciding, results_of, worst_held
 from engine.kernels.nearest_pilots import cheapest, nearest
 from engine.march.outcome import Asked
@@ -329,11 +330,11 @@ def sets_modes(cases: Cases) -> Mask:
 
 
 def _sorts(of: Pilots, found: Found, along: Array) -> Counts:
-    """(P,) which pilots tell together: those of the same fixed modes, and apart from these those whose reference did
-    not converge, of which nothing is known (as of one speed, a hundredth of the others, for all of these)."""
+    """(P,) which pilots tell together: those of the same fixed modes, and apart from these those whose reference is
+    doubtful or did not converge: few of them made many others miss a tolerance that these hold."""
     results = deciding(results_of(of.asked), of.asked.study.solver.tolerance)
-    unknown = np.isnan(worst_held(found.measured.reference, results))
-    labels = np.column_stack([along[:, sets_modes(of.cases)], unknown])
+    doubtful = ~(worst_held(found.measured.reference, results, of.span[0]) <= DOUBTED)
+    labels = np.column_stack([along[:, sets_modes(of.cases)], doubtful])
     return np.asarray(np.unique(labels, axis=0, return_inverse=True)[1].reshape(-1), dtype=np.int64)
 
 
