@@ -167,19 +167,25 @@ class Rungs:
         return np.searchsorted(np.array(self.ladder.cuts), np.maximum(least, FIRST / self.unit(column) * periods))
 
     def fine(self, column: int) -> Counts:
-        """(P,) the rung at which a column's modes are judged: that of the reference's level, where it is one."""
+        """(P,) the rung at which a column's modes are judged: that of the reference's level, where it is one and has
+        steps enough, or more would be more work than the reference."""
         least, periods = self.least(column)
-        of_period, of_grid = FINE.get(self.model(column).scheme.name, FINE[""])
+        scheme = self.model(column).scheme.name
+        of_period, of_grid = FINE.get(scheme, FINE[""])
         wanted = np.maximum(least, np.maximum(of_period / self.unit(column) * periods, of_grid))
         if column in self.levels:
-            wanted[self.levels[column].lanes] = self.levels[column].by
+            lanes, by = self.levels[column].lanes, self.levels[column].by
+            work = wanted[lanes] * self.unit(column) * self.model(column).body_modes
+            enough = (scheme in FINE) | (by >= wanted[lanes]) | (work > self.truth.used["work"][lanes])
+            wanted[lanes] = np.where(enough, by, wanted[lanes])
         return np.searchsorted(np.array(self.ladder.cuts), wanted)
 
     def known(self, column: int) -> NDArray[np.bool_]:
-        """(P,) whether a column was a level of the reference, on one of the ladder's rungs."""
+        """(P,) whether a column is judged by a level of the reference."""
         found = np.zeros(self.values.size, dtype=np.bool_)
         if column in self.levels:
-            found[self.levels[column].lanes] = self.levels[column].by <= self.ladder.cuts[-1]
+            lanes, by = self.levels[column].lanes, self.levels[column].by
+            found[lanes] = np.append(self.ladder.cuts, 0)[self.fine(column)[lanes]] == by
         return found
 
     def least(self, column: int) -> tuple[Array, Array]:
