@@ -17,7 +17,7 @@ from engine.scene.study import Study
 from results_schema.arrays import Array
 from results_schema.store.rows import Collector
 from tests.accuracy.passages import OPEN, SPEED, WEIGHT, axis, passages
-from tests.engine.build import Table, beam, fixed
+from tests.engine.build import Table, aboard, beam, cruise, fixed, oscillator, steel, study
 
 TOLERANCE = "solver.tolerance"
 LENGTHS = {"length": {"of": "body.bed.length", "values": [1.0, 1.1, 1.2]}}
@@ -45,6 +45,15 @@ STUDIES: dict[str, Study] = {
     "numbers of modes": sweep(
         bed=OPEN,
         sweep=SPEEDS | WEIGHTS | {"kept": {"of": "body.bed.modes", "values": [4, 8, MAX_MODES]}},
+    ),
+    "stiffnesses": study(
+        steel(15.0, second_moment=8.33e-5, damping_ratio=0.02, modes="auto"),
+        oscillator(100.0, 2e4, cruise(0.0, 15.0, 8.0, after=2.0), damping=150.0, wheel_mass=15.0),
+        sensor={"midspan": fixed(7.5), "aboard": aboard("car")},
+        sweep={
+            "stiffness": axis("carriage.car.stiffness", 1e3, 1e8, 20) | {"spacing": "log"},
+            "speed": axis(SPEED, 2.0, 30.0, 20),
+        },
     ),
     "lengths": sweep(sweep=LENGTHS | SPEEDS | WEIGHTS, sensor={"quarter": fixed(0.25)}),
     "told only": sweep(sensor=midspan("told")),
