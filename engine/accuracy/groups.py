@@ -222,14 +222,9 @@ class MarchGroup(Group):
                 for name, column in used(group.tables, own.size).items():
                     taken[name][own] = column
                 group.forget()
-        # What does not rise with vibration, as errors of few modes, is as it was foreseen.
-        held, told = (
-            np.maximum(foreseen, found)
-            for foreseen, found in (
-                (choice.held(variants, rung, values.tighter, by) for by in (None, heard)),
-                (choice.errors(variants, rung, by) for by in (None, heard)),
-            )
-        )
+        either = None, heard  # what does not rise with vibration, as errors of few modes, is as it was foreseen
+        held = np.maximum(*(choice.held(variants, rung, values.tighter, by) for by in either))
+        told = np.maximum(*(choice.errors(variants, rung, by) for by in either))
         return Found(now, taken, told, held)
 
     def forget(self) -> None:
