@@ -46,9 +46,9 @@ NEIGHBOURS = 10
 # What is said of the next three was measured on `asymmetry`, `double-peak` and 10,000 passages, with 128 to 256 pilots,
 # by the largest error of 6 neighbours.
 LEAST_WEIGHT = 0.02  # of the largest weight of an axis: none is left out; 0.005 to 0.1 chose alike
-APART = 1e6  # times the largest weight: of 64 modes 63 are farther than all that have 64
 NEAR_PAIRS = 12  # pairs of near pilots per pilot that tell the weights: 6 to 40 took 0.7 to 1 times the work
 SWEEPS = 50  # over the weights: scipy's to eight digits, but for axes that tell the same twice
+APART = 1e6  # times the largest weight: what has 63 modes is farther from what has 64 than all others with 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,7 +211,7 @@ def choose(of: Pilots, found: Found, share: Share) -> Choice:
     """The choice for all variants of a sweep by what its pilots found. Raises Halted."""
     (scene, order, measured), cases = found, of.cases
     along = coordinates(cases, order)
-    places = Places(along, _weights(along, measured, sets_modes(cases)))
+    places = Places(along, _weights(along, measured, _sets_modes(cases)))
     others, held = nearest_others(places.weighted, NEIGHBOURS), measured.held.reshape(-1, order.size)
     foreseen = Cheapest.by(neighbour_errors_of(of.asked, measured, places, others, of.span), of.cost(scene), held)
     known = foreseen
@@ -323,7 +323,7 @@ def _varied(cases: Cases) -> list[Axis]:
     return [axis for axis in axes_of_scene(cases) if axis.root_ends[0] < axis.root_ends[1]]
 
 
-def sets_modes(cases: Cases) -> Mask:
+def _sets_modes(cases: Cases) -> Mask:
     """(D,) which axes of places fix a number of modes: with another one a rung is another march."""
     found = [any(path.endswith(".modes") for path in axis.paths) for axis in _varied(cases)]
     return np.array(found or [False])
@@ -334,7 +334,7 @@ def _sorts(of: Pilots, found: Found, along: Array) -> Counts:
     doubtful or did not converge: few of them made many others miss a tolerance that these hold."""
     results = deciding(results_of(of.asked), of.asked.study.solver.tolerance)
     doubtful = ~(worst_held(found.measured.reference, results, of.span[0]) <= DOUBTED)
-    labels = np.column_stack([along[:, sets_modes(of.cases)], doubtful])
+    labels = np.column_stack([along[:, _sets_modes(of.cases)], doubtful])
     return np.asarray(np.unique(labels, axis=0, return_inverse=True)[1].reshape(-1), dtype=np.int64)
 
 

@@ -207,8 +207,8 @@ def _in_parts(results: Results, axis: Axis, beyond: Mask) -> str:
     """At each value of a swept number, in which part of its variants values are beyond a threshold."""
     own, known = results.everywhere(results.dataset[axis.name]), results.with_values
     parts = {float(value): beyond[(own == value) & known].mean() for value in np.unique(own[known])}
-    if len(set(parts.values())) == 1 and {*parts.values()} <= {0.0, 1.0}:
-        return f"{'everywhere' if beyond.any() else 'nowhere'} from {axis.span}"
+    if {*parts.values()} == {1.0}:
+        return f"everywhere from {axis.span}"
     told = [f"at {axis.in_words(value)} in {percent(part)}" for value, part in parts.items()]
     return f"{listed(told)} of the variants"
 

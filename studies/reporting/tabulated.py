@@ -134,9 +134,8 @@ def _chosen(results: Results, names: Sequence[str]) -> xr.Dataset:
     known = [str(name) for name in (*dataset.data_vars, *dataset.coords) if name not in dataset.dims]
     for name in names:
         if name not in known:
-            remedy = did_you_mean(name, known)
-            if name in dataset.dims:
-                remedy = "leave it out: swept numbers are always in the table, beside the results that are named"
+            swept = "leave it out: swept numbers are always in the table, beside the results that are named"
+            remedy = swept if name in dataset.dims else did_you_mean(name, known)
             expected = f"one of {len(known)} results, which info --all lists"
             raise BadInput("no such result", where="results", expected=expected, received=name, remedy=remedy)
     kept = {*names, *(axis.name for axis in results.axes), *dataset.dims, "status"}

@@ -134,3 +134,13 @@ def test_errors_of_an_amplification_have_no_unit() -> None:
     """As itself."""
     errors = studies.errors(studies.run(stops(output={"histories": "none"})))
     assert errors.dynamic_amplification.attrs["units"] == "1" and errors.midspan_max.attrs["units"] == "m"
+
+
+def test_what_a_variant_has_not_has_no_error() -> None:
+    found = studies.run(stops(output={"residual": True, "histories": "none"}))
+    whole = studies.errors(found).midspan_residual.values
+    found.midspan_residual[1] = np.nan
+    assert np.isfinite(whole).all()
+    np.testing.assert_array_equal(
+        np.isnan(studies.errors(found).midspan_residual.values), np.isnan(found.midspan_residual)
+    )

@@ -192,13 +192,21 @@ def test_the_study_of_the_documentation() -> None:
 def test_it_is_said_how_long_it_takes_to_settle() -> None:
     """At most, for which variant, and how many have not settled."""
     damped, sensors = beam(modes=1, damping_ratio=0.03), {"midspan": {"body": "bed", "at": 0.5, "settling_band": 8e-3}}
-    closely = {"output": {"residual": True}, "sensor": sensors, "sweep": SWEPT, "solver": {"tolerance": 1e-4}}
-    by_dwell = [studies.run(study(damped, force(2.0, MOVE | {"dwell": dwell}), **closely)) for dwell in (1.5, 3.0, 6.0)]
+    given = {"output": {"residual": True}, "sensor": sensors, "sweep": SWEPT}
+    by_dwell = [studies.run(study(damped, force(2.0, MOVE | {"dwell": dwell}), **given)) for dwell in (1.5, 3.0, 6.0)]
     brief, times, told = (found.midspan_settling_time.values for found in by_dwell)
     found = by_dwell[1]
     assert np.isnan(brief).sum() == 4 and np.isnan(told).sum() == 0  # what swings out again has not settled
     assert np.isnan(times).sum() == 2 and np.nanmax(times) > 2.0
-    np.testing.assert_allclose(times[np.isfinite(times)], told[np.isfinite(times)], atol=1e-4)
+    known = np.isfinite(times)
+    doubt = sum(studies.errors(one).midspan_settling_time.values[known] for one in by_dwell[1:])
+    assert np.all(np.abs(times - told)[known] <= doubt) and np.all(doubt <= 0.05 * told[known])
+    closely = [
+        studies.run(study(damped, force(2.0, MOVE | {"dwell": dwell}), solver={"tolerance": 1e-4}, **given))
+        for dwell in (3.0, 6.0)
+    ]
+    short, long = (one.midspan_settling_time.values for one in closely)
+    np.testing.assert_allclose(short[known], long[known], atol=1e-4)
     (said,) = (text for text in answers.answer(found) if "at rest" in text)
     longest, latest = STEPS[int(np.nanargmax(times))], f"{np.nanmax(times):.3g} s after the stop at the latest"
     assert f"it has settled within 8 mm of its static value {latest} at acceleration {longest} m/s²" in said

@@ -97,6 +97,8 @@ def test_a_dataset_is_exported_as_the_command_does(tmp_path: Path) -> None:
     studies.export(found, by_call, overwrite=True)
     assert len(by_call.read_bytes()) > len(by_command.read_bytes())
     assert "no such result" in refused(studies.export, found, tmp_path / "other.csv", ["deflection"])
+    said = refused(studies.export, found, tmp_path / "other.csv", ["pace"])
+    assert "swept numbers are always in the table" in said and not (tmp_path / "other.csv").exists()
 
 
 def test_what_was_selected_from_a_dataset_is_told_from_its_whole() -> None:
