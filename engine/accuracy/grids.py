@@ -34,7 +34,7 @@ PASSAGE_STEPS, CYCLE_STEPS = 32, 50
 MODES = (4, 8, 16, 32, 64)  # that loads excite, of levels: 64 are what a beam's closed forms were tested for
 FEWER, LEAST_LEVELS = (2, 1), 3  # the same where 64 modes hold few of them, and the levels that an error is told from
 PILOT_PLACES = 9  # of an envelope, at which its error is measured: a mode or two lie between them at 1e-3
-MOST_COMPARED = 4096  # stations of the histories that are compared: 0.5 MB of 16 variants each signal
+MOST_COMPARED = 4096  # stations of the histories that are compared: 0.25 MB of 8 variants each signal
 KEPT_CYCLE = 256 * 2**20  # of a cycle's tables: ten of 64 modes x 102,400 steps took 2.1 s, 3.1 s with 96 MB
 LEAST_FREE = 8  # steps per first period of free vibration: what the coarsest march of such passages had
 

@@ -17,7 +17,6 @@ from engine.floating.converge import MORE_MODES, STATIONS, Level, levels, statio
 from engine.floating.march import march
 from engine.floating.model import build
 from engine.floating.results import Outcome, differences, outcome, results_of
-from engine.kernels.layout import LANES
 from engine.kernels.schemes import NewmarkScheme
 from engine.scene.frames import GROUND
 from results_schema.arrays import Array
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
     from engine.scene.study import Study
     from engine.scene.variants import VariantValues
 
-PILOTS = LANES  # of a scene: a block of lanes takes as long, however few of them are used
+PILOTS = 16  # of a scene: two blocks of lanes, which take as long however few of them are used
 PART = 0.1  # of a tolerance that the cheaper model may take; the rest is for modes and steps
 UNLIMITED = NewmarkScheme("average-acceleration", 0.25, 0.5)  # in its steps, however fast the highest mode is
 FINER = (1, 4, 16)  # times the coarsest steps, where pilots fail with these

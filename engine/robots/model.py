@@ -19,6 +19,7 @@ from engine.kernels.robots.layout import (
     LINK,
     MASS,
     MODES,
+    POWERS,
     SLIDES,
     System,
 )
@@ -138,16 +139,15 @@ def _tracks(rails: list[Rail], corrected: bool) -> tuple[Counts, Array, Array, A
     most, modes = max(one.ends.size for one in rails), np.array([one.omega.size for one in rails])
     tracks = np.stack([np.cumsum(modes) - modes, modes, [one.ends.size - 1 for one in rails]], axis=1)
     ends = np.full((len(rails), most), np.inf)
-    shapes = np.zeros((len(rails), most - 1, modes.max(), 2, 2, LANES // 2))
+    shapes = np.zeros((len(rails), most - 1, modes.max(), POWERS, LANES))
     missed = np.zeros((len(rails), 6 * most * corrected, 6 * most * corrected))
     for b, one in enumerate(rails):
         size = one.ends.size
         ends[b, :size] = one.ends
-        cubics = np.moveaxis(one.shapes, 3, 1).reshape(size - 1, one.omega.size, 2, 2, 6)
-        shapes[b, : size - 1, : one.omega.size, :, :, :6] = cubics
+        shapes[b, : size - 1, : one.omega.size, :, :6] = np.moveaxis(one.shapes, 3, 1)
         if corrected:
             missed[b, : 6 * size, : 6 * size] = one.missed
-    return tracks, ends, shapes.reshape(*shapes.shape[:4], LANES), missed
+    return tracks, ends, shapes, missed
 
 
 class _Stands(NamedTuple):

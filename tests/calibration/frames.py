@@ -21,7 +21,6 @@ from engine.floating.march import march
 from engine.floating.model import FloatingModel, build
 from engine.floating.model_choice import choose
 from engine.floating.results import Outcome, differences, outcome, results_of
-from engine.kernels.layout import LANES
 from engine.linear_algebra import one_thread
 from engine.scene.study import Study, load
 from engine.scene.sweep import expand
@@ -35,7 +34,7 @@ from tests.engine.build import Table
 Random = np.random.Generator
 Columns = dict[str, Array]
 
-SIZE = LANES  # variants of a scene: a block of lanes takes as long, however few of them are used
+SIZE = 16  # variants of a scene: two blocks of lanes, which take as long however few of them are used
 FINER = (4, 1.5), (8, 2.0)  # times the steps that told an error, and times the modes where these are open
 MOST_WORK = 3e6  # steps x coordinates of a truth: about ten seconds
 

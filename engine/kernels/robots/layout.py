@@ -7,7 +7,7 @@ of six: translation and rotation, force and moment.
 
 from typing import NamedTuple
 
-from engine.kernels.layout import LANES, FloatArray, IntArray
+from engine.kernels.layout import FloatArray, IntArray
 
 # columns of System.counts: joints, moves, and whether drives are told the forces of the whole plan
 JOINTS, MOVES_TOLD, WHOLE = range(3)
@@ -53,9 +53,10 @@ MOVED = 6
 # limit of its step, and that of coordinates which go without; accelerations of the step before; the direction in which
 # weight is the stiffest beside springs
 CHANGE, MOMENTUM, EXTRA, SOFT, BEFORE, LIKELY, VECTORS = 0, 1, 2, 3, 4, 5, 6
-# rows of Work.cubics: sums of modes' cubics times y, y' and y''; a load for such cubics
-CUBIC, LOADED, CUBICS = 0, 6, 8
-SECOND_HALF = LANES // 2  # of a row of cubics: what is there belongs to the power above that in the first half
+# rows of Work.cubics, six of whose lanes are used: sums of modes' cubics times y, y' and y'', power by power; a load
+# for such cubics
+POWERS = 4  # of a cubic, from the constant on
+CUBIC, LOADED, CUBICS = 0, 3 * POWERS, 4 * POWERS
 
 # what a robot does at a time: moves, holds, works
 MOVES, HOLDS, WORKS = range(3)
@@ -71,9 +72,9 @@ class System(NamedTuple):
     coordinates, of modes omega^2 and 2 zeta omega.
     body (R, 2): that a robot stands on, -1 for none;  share (R, 2, 7, 6): motion of the base by that of the track's
     axis, and in the first of row 6 its place on that track less that of the robot;  tracks (B, 3): columns above;
-    ends (B, E + 1): ends of a track's elements, m;  shapes (B, E, n, 2, LANES): motion of the axis per mode, cubics in
-    the distance from an end: constants in the first half of row 0, linear terms in its second, then row 1;  missed (B,
-    6 (E + 1), 6 (E + 1)): motions of the ends per unit load on them that the modes miss.
+    ends (B, E + 1): ends of a track's elements, m;  shapes (B, E, n, POWERS, LANES): the six motions of the axis per
+    mode, cubics in the distance from an end;  missed (B, 6 (E + 1), 6 (E + 1)): motions of the ends per unit load on
+    them that the modes miss.
     moves (R, M, MOVE): columns above;  stays (R, M + 1, J + 2): joints before and after moves, the payload from the
     beginning of a move on, and s up to which a robot works after it.
     """

@@ -15,7 +15,7 @@ from engine.kernels.robots.layout import (
     LOADS,
     MISSING,
     MODES,
-    SECOND_HALF,
+    POWERS,
     UP_THERE,
 )
 from engine.kernels.vector import lanes_at, put_lanes, total
@@ -40,23 +40,28 @@ def section(system, body, s, state, work, grip):
     the body, derivatives of the motion per mode B by the place; the place into columns of ``grip``."""
     e, x = element_at(system, body, s)
     first, motions, cubics = system.tracks[body, FIRST], work.motions, work.cubics
-    for half in range(2):  # twelve registers of sums at once are what the processor has room for
-        y_sum, v_sum, a_sum = no_vector()
+    for power in range(0, POWERS, 2):  # twelve registers of sums at once are what the processor has room for
+        y_low, v_low, a_low = no_vector()
+        y_high, v_high, a_high = no_vector()
         for k in range(system.tracks[body, MODES]):
-            own = lanes_at(system.shapes, (body, e, k, half))
-            y_sum = y_sum + state[first + k, 0] * own
-            v_sum = v_sum + state[first + k, 1] * own
-            a_sum = a_sum + state[first + k, 2] * own
-        put_lanes(cubics, (CUBIC + 3 * half,), y_sum)
-        put_lanes(cubics, (CUBIC + 3 * half + 1,), v_sum)
-        put_lanes(cubics, (CUBIC + 3 * half + 2,), a_sum)
+            low = lanes_at(system.shapes, (body, e, k, power))
+            high = lanes_at(system.shapes, (body, e, k, power + 1))
+            y, v, a = state[first + k, 0], state[first + k, 1], state[first + k, 2]
+            y_low, v_low, a_low = y_low + y * low, v_low + v * low, a_low + a * low
+            y_high, v_high, a_high = y_high + y * high, v_high + v * high, a_high + a * high
+        put_lanes(cubics, (CUBIC + 3 * power,), y_low)
+        put_lanes(cubics, (CUBIC + 3 * power + 1,), v_low)
+        put_lanes(cubics, (CUBIC + 3 * power + 2,), a_low)
+        put_lanes(cubics, (CUBIC + 3 * power + 3,), y_high)
+        put_lanes(cubics, (CUBIC + 3 * power + 4,), v_high)
+        put_lanes(cubics, (CUBIC + 3 * power + 5,), a_high)
     for i in range(work.six.shape[1]):
         for order in range(3):
-            c0, c1 = cubics[CUBIC + order, i], cubics[CUBIC + order, SECOND_HALF + i]
-            c2, c3 = cubics[CUBIC + 3 + order, i], cubics[CUBIC + 3 + order, SECOND_HALF + i]
+            c0, c1 = cubics[CUBIC + order, i], cubics[CUBIC + 3 + order, i]
+            c2, c3 = cubics[CUBIC + 6 + order, i], cubics[CUBIC + 9 + order, i]
             motions[i, order] = c0 + x * (c1 + x * (c2 + x * c3))
             motions[i, 3 + order] = c1 + x * (2.0 * c2 + 3.0 * x * c3)  # that of B' y'' gives way
-        motions[i, 5] = 2.0 * cubics[CUBIC + 3, i] + 6.0 * x * cubics[CUBIC + 3, SECOND_HALF + i]
+        motions[i, 5] = 2.0 * cubics[CUBIC + 6, i] + 6.0 * x * cubics[CUBIC + 9, i]
     grip[ELEMENT], grip[INTO], grip[UP_THERE] = e, x, motions[2, 0]
 
 
@@ -64,23 +69,24 @@ def section(system, body, s, state, work, grip):
 def push_on(system, body, grip, work, left):
     """The wrench of a robot on a rail, in columns of ``grip``, added to what is left (N) of the modes."""
     e, power, cubics = int(grip[ELEMENT]), 1.0, work.cubics
-    for row in range(LOADED, LOADED + 2):
-        for half in (0, SECOND_HALF):
-            for i in range(6):
-                cubics[row, half + i] = power * grip[GRIP + i]
-            power *= grip[INTO]
-    low, high = lanes_at(cubics, (LOADED,)), lanes_at(cubics, (LOADED + 1,))
+    for row in range(LOADED, LOADED + POWERS):
+        for i in range(6):
+            cubics[row, i] = power * grip[GRIP + i]
+        power *= grip[INTO]
+    by_0, by_1 = lanes_at(cubics, (LOADED,)), lanes_at(cubics, (LOADED + 1,))
+    by_2, by_3 = lanes_at(cubics, (LOADED + 2,)), lanes_at(cubics, (LOADED + 3,))
     for k in range(system.tracks[body, MODES]):
-        by = low * lanes_at(system.shapes, (body, e, k, 0)) + high * lanes_at(system.shapes, (body, e, k, 1))
-        left[system.tracks[body, FIRST] + k] += total(by)
+        even = by_0 * lanes_at(system.shapes, (body, e, k, 0)) + by_2 * lanes_at(system.shapes, (body, e, k, 2))
+        odd = by_1 * lanes_at(system.shapes, (body, e, k, 1)) + by_3 * lanes_at(system.shapes, (body, e, k, 3))
+        left[system.tracks[body, FIRST] + k] += total(even + odd)
 
 
 @called
 def along_track(system, body, grip, i, k):
     """Motion i of the axis of a track, where a robot stands on it, by mode k."""
-    e, x, half = int(grip[ELEMENT]), grip[INTO], SECOND_HALF + i
+    e, x = int(grip[ELEMENT]), grip[INTO]
     cubic = system.shapes[body, e, k]
-    return cubic[0, i] + x * (cubic[0, half] + x * (cubic[1, i] + x * cubic[1, half]))
+    return cubic[0, i] + x * (cubic[1, i] + x * (cubic[2, i] + x * cubic[3, i]))
 
 
 @called
