@@ -40,6 +40,7 @@ MOST_WORK = 3e7
 #: Modes x steps over the whole time of a march that a reference is not worth which is off by less than so much of the
 #: tolerance: in the built-in shuttles such marches were nine tenths of all, and the choice was the same.
 DEAR, DOUBTED = 1e7, 0.4
+FAR_TOO_DEAR = 10.0  # times that: seconds, for which what is within the tolerance at all is close enough
 FIRST_PERIODS = 20  # steps per first period of average acceleration at level 0: 8e-3 of phase, 2e-6 at level 3
 USUAL_LEVEL = 2  # to which most pilots and answers go; for expected times only
 MARGIN = 1.25  # times the rules that no march may break: bands of growth end at 1.1, and 1.1 to 1.6 chose alike
@@ -192,8 +193,10 @@ def converge(
         found = _updated(found, active, now, spent, remaining)
         change[:, active] = apart
         off = worst_held(remaining, decisive, own.tighter)
-        too_dear = _is_dear(grid, own, levels, level + 1, beyond.dear)
-        settled = (off <= part) | ((off <= DOUBTED) & too_dear)
+        next_work = _work_in_all(grid, own, levels, level + 1)
+        too_dear = next_work > beyond.dear
+        enough = np.select([next_work > FAR_TOO_DEAR * beyond.dear, too_dear], [1.0, DOUBTED], part)
+        settled = off <= enough
         found.settled[active] = settled
         found.spent[active] += spent["work"]
         found.level[active] = level
@@ -203,11 +206,11 @@ def converge(
     return found
 
 
-def _is_dear(grid: SceneGrid, values: VariantValues, levels: Levels, level: int, dear: float) -> NDArray[np.bool_]:
-    """(V,) whether a level takes more work, over the whole time, than a closer reference is worth."""
+def _work_in_all(grid: SceneGrid, values: VariantValues, levels: Levels, level: int) -> Array:
+    """(V,) modes x steps of a level over the whole time; nothing beyond the last one."""
     if level == len(levels.numerics):
-        return np.zeros(values.size, dtype=np.bool_)
-    return passages(grid) * level_work(grid, values, levels, level) > dear
+        return np.zeros(values.size)
+    return passages(grid) * level_work(grid, values, levels, level)
 
 
 def left_over(change: Array, before: Array, least: Array | float = LEAST_LEFT) -> Array:
@@ -341,7 +344,7 @@ def usual_work(grid: SceneGrid, values: VariantValues, dear: float) -> Array:
     levels = in_full(grid)
     usual = min(USUAL_LEVEL, len(levels.numerics) - 1)
     more = min(usual + 1, len(levels.numerics) - 1)
-    level = np.where(_is_dear(grid, values, levels, more, dear), usual, more)
+    level = np.where(_work_in_all(grid, values, levels, more) > dear, usual, more)
     work = [level_work(grid, values, levels, number) for number in (usual, more)]
     return passages(grid) * np.where(level == usual, *work)
 
