@@ -195,8 +195,8 @@ def converge(
         off = worst_held(remaining, decisive, own.tighter)
         next_work = _work_in_all(grid, own, levels, level + 1)
         too_dear = next_work > beyond.dear
-        enough = np.select([next_work > FAR_TOO_DEAR * beyond.dear, too_dear], [1.0, DOUBTED], part)
-        settled = off <= enough
+        enough = np.select([next_work > FAR_TOO_DEAR * beyond.dear, too_dear], [1.0, DOUBTED])
+        settled = off <= np.maximum(part, enough)
         found.settled[active] = settled
         found.spent[active] += spent["work"]
         found.level[active] = level

@@ -9,9 +9,11 @@ import pytest
 
 import engine
 import studies
+from engine.accuracy.climb import REFERENCE_PART
 from engine.accuracy.grids import SceneGrid
 from engine.accuracy.reference import (
     DEAR,
+    DOUBTED,
     STAYS,
     STAYS_UNCORRECTED,
     Beyond,
@@ -127,6 +129,28 @@ def test_levels_end_where_nothing_changes_any_more() -> None:
     fine, coarse = (levels(only_grid(passages(3, 3, solver={"tolerance": t}))) for t in (1e-4, 1e-2))
     assert coarse.settled.all() and fine.settled.all()
     assert np.all(coarse.used["work"] <= fine.used["work"]) and coarse.used["work"].sum() < fine.used["work"].sum()
+
+
+def test_what_is_within_the_tolerance_is_not_marched_again_for_seconds() -> None:
+    """A slow shuttle of 340 kg, to whose few modes eight add by chance what they then take back."""
+    given = engine.load(catalogue.find_study("double-peak")).with_values(
+        {
+            "sweep": {},
+            "carriage.table.motion.frequency": 0.0343,
+            "carriage.table.motion.cycles": 16,
+            "carriage.table.mass": 340,
+            "body.bed.damping_ratio": 0.02,
+        }
+    )
+    grid = only_grid(given)
+    found = converge(Marches(grid, grid.values, in_full(grid)), REFERENCE_PART)
+    closer = converge(Marches(grid, grid.values, in_full(grid)), REFERENCE_PART, Beyond(0, math.inf))
+    assert found.settled.all() and closer.settled.all() and closer.level[0] == found.level[0] + 1
+    held = np.isfinite(tolerances(results_of(grid.asked)))
+    model = grid.model(in_full(grid).numerics[closer.level[0]])
+    off = differences(grid.asked, model, grid.values, found.outcome, closer.outcome)[held]
+    assert DOUBTED * 1e-3 < found.error[held].max() <= 1e-3
+    assert np.all(off <= found.error[held])
 
 
 def test_a_variant_does_not_depend_on_its_neighbours() -> None:

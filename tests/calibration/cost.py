@@ -1,8 +1,9 @@
 """What variants of a sweep are given beside the least that holds, by brute force.
 
-`python -m tests.calibration.cost [--judged N] [--tolerance T ...] [--moment] [--sweeps N --seed S]`: a sweep of 100,000
-passages (speed, mass and damping drawn at random), or scenes of the calibration as sweeps; some variants that are no
-pilots are marched with 13 numbers of modes x 16 of steps x 2 schemes, beside 64 modes and 64,000 steps or more.
+`python -m tests.calibration.cost [--judged N] [--tolerances T ...] [--quantity Q] [--sweeps N --size 1024 --seed S]`: a
+sweep of 100,000 passages (speed, mass and damping drawn at random), or scenes of the calibration as sweeps; some
+variants that are no pilots are marched with 13 numbers of modes x 16 of steps x 2 schemes, beside 64 modes and 64,000
+steps or more.
 """
 
 import argparse
