@@ -92,6 +92,9 @@ def test_range_and_largest_speed(motion: Motion) -> None:
         tau = np.concatenate([np.linspace(a, b, 401) for a, b in pairwise(edges)])
     if isinstance(motion, PointToPoint):  # the top speed may last no time
         tau = np.union1d(tau, motion.breaks())
+    for extreme in (np.argmin, np.argmax):  # short intervals beside long ones turn between two of those instants
+        near = extreme(motion.path(tau).S)
+        tau = np.union1d(tau, np.linspace(tau[max(near - 1, 0)], tau[min(near + 1, tau.size - 1)], 401))
     path = motion.path(tau)
     low, high = motion.range()
     slack = 1e-5 * (high - low)
