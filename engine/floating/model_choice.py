@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from engine.scene.study import Study
     from engine.scene.variants import VariantValues
 
-PILOTS = 16  # of a scene: two blocks of lanes, which take as long however few of them are used
+PILOTS = 16  # of a scene: by so many the errors that are told were measured (`tests.calibration.frames`)
 PART = 0.1  # of a tolerance that the cheaper model may take; the rest is for modes and steps
 UNLIMITED = NewmarkScheme("average-acceleration", 0.25, 0.5)  # in its steps, however fast the highest mode is
 FINER = (1, 4, 16)  # times the coarsest steps, where pilots fail with these
