@@ -41,7 +41,7 @@ MOST_WORK = 3e7
 #: tolerance: in the built-in shuttles such marches were nine tenths of all, and the choice was the same.
 DEAR, DOUBTED = 1e7, 0.4
 #: Times what is dear, from where all that is within the tolerance is close enough: some seconds, which one of the 180
-#: pilots of `double-peak` took of 18 in all; without them none of its 2,160 variants missed, with as many modes as before.
+#: pilots of `double-peak` took of 18 in all; without them none of its 2,160 variants missed, with as many modes.
 FAR_TOO_DEAR = 10.0
 FIRST_PERIODS = 20  # steps per first period of average acceleration at level 0: 8e-3 of phase, 2e-6 at level 3
 USUAL_LEVEL = 2  # to which most pilots and answers go; for expected times only
