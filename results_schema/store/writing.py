@@ -1,5 +1,6 @@
 """Tables into one netCDF-4 file: the same tables give the same bytes."""
 
+import math
 import zlib
 from collections.abc import Mapping
 from dataclasses import replace
@@ -18,6 +19,7 @@ PACKED: Mapping[str, Any] = {"compression": "zlib", "complevel": 1, "shuffle": T
 # What keeps more than this part of its bytes is left as it is: results of a march keep two thirds, and to pack those of
 # a million variants takes longer than a tenth of the march itself.
 WORTH_PACKING = 0.6
+TRIED_BYTES = 2**17  # of the first chunk: to try all of it in 27 columns took as long as to write them
 
 
 def write_tables(
@@ -73,11 +75,12 @@ def _write_column(place: Any, name: str, column: Column, filters: Mapping[str, A
 
 
 def _shrinks(data: Any, shape: tuple[int, ...]) -> bool:
-    """Whether the first chunk of an array says that it is worth packing; arrays of a chunk are."""
+    """Whether the beginning of an array's first chunk says that it is worth packing; arrays of a chunk are."""
     if data.nbytes <= CHUNK_BYTES:
         return True
     size = data.dtype.itemsize
-    first = np.asarray(data[: shape[0]])[tuple(slice(length) for length in shape)]
+    rows = max(1, TRIED_BYTES // (size * math.prod(shape[1:])))
+    first = np.asarray(data[: min(rows, shape[0])])[tuple(slice(length) for length in shape)]
     shuffled = np.ascontiguousarray(first).view(np.uint8).reshape(-1, size).T.tobytes()
     return len(zlib.compress(shuffled, PACKED["complevel"])) < WORTH_PACKING * len(shuffled)
 

@@ -11,7 +11,7 @@ from results_schema.status import Status, label
 from studies.commands.console import blank, heading, paragraphs, say, table, warn
 from studies.findings.numerics_used import is_marched, told_choices
 from studies.protocol.study import kind_named
-from studies.reporting.answers import answer_of, found_of, left_out_of_answer
+from studies.reporting.answers import found_of, short_answer_of
 from studies.results.cells import percentile_spans
 from studies.results.findings_common import missed_most, remedy
 from studies.results.formatting import counted, listed, number, quantity, spanned
@@ -125,7 +125,7 @@ def show_outcome(outcome: Outcome) -> None:
 
     results = Results.of(outcome.results)
     heading(outcome.results.attrs["title"])
-    said, left = answer_of(results), left_out_of_answer(results)
+    said, left = short_answer_of(results)
     paragraphs(*said, *([f"{counted(left, 'more sentence')}: run -v, or the report."] if left else []))
     if not summary.is_measured(outcome.results):  # the grid of those that measure is of methods: its ends say nothing
         found = summary.in_tables(results)

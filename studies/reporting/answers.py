@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from results_schema.lazy_imports import xr
 from studies.findings.cells import findings_of_cells
@@ -30,18 +30,23 @@ def figures(dataset: xr.Dataset) -> list[Figure]:
     return figures_of(check_named(Results.of(dataset)))
 
 
+class ShortAnswer(NamedTuple):
+    """The answer in two to five sentences, and how many further ones there are, with those on envelopes."""
+
+    said: list[str]
+    left: int
+
+
 def answer_of(results: Results) -> list[str]:
     """The answer in two to five sentences: what the kind of study says first."""
-    return _answers(results)[:MOST_SAID]
+    return short_answer_of(results).said
 
 
-def left_out_of_answer(results: Results) -> int:
-    """How many further sentences there are, with those on envelopes."""
-    return len(found_of(results)) - len(_findings(results)) + len(_answers(results)[MOST_SAID:])
-
-
-def _answers(results: Results) -> list[str]:
-    return [text for text in _findings(results) if text not in told_statuses(results)]
+def short_answer_of(results: Results) -> ShortAnswer:
+    """The same, and what is left out of it."""
+    found, statuses = _findings(results), told_statuses(results)
+    own = [text for text in found if text not in statuses]
+    return ShortAnswer(own[:MOST_SAID], len(own[MOST_SAID:]) + len(_of_envelopes_besides(results, found)))
 
 
 def findings_of(results: Results) -> list[str]:
@@ -52,7 +57,12 @@ def findings_of(results: Results) -> list[str]:
 def found_of(results: Results) -> list[str]:
     """What the kind of study finds, then what those envelopes say of which it says nothing."""
     found = _findings(results)
-    return [*found, *(text for text in told_envelopes(results) if not any(one.startswith(text) for one in found))]
+    return [*found, *_of_envelopes_besides(results, found)]
+
+
+def _of_envelopes_besides(results: Results, found: list[str]) -> list[str]:
+    """What those envelopes say of which the findings say nothing."""
+    return [text for text in told_envelopes(results) if not any(one.startswith(text) for one in found)]
 
 
 def _findings(results: Results) -> list[str]:

@@ -90,7 +90,7 @@ class Axis:
     @property
     def span(self) -> str:
         """Its smallest and largest value, or its one value, with their unit."""
-        return self.spans([np.sort(self.values)])
+        return self.spans([np.array([self.values.min(), self.values.max()])])
 
     def spans(self, parts: Sequence[Array]) -> str:
         """From the first to the last of each of some parts of its values, with their unit behind the last alone, where
