@@ -30,7 +30,8 @@ class Quantity:
     unit: CF. derivative: its order by the place; rate: by time, of the point that a sensor reads, wherever that moves.
     factor: what the derivative is multiplied by. of_section: a section force, stress or strain, which bodies other than
     a uniform beam tell by its name. needs_fibre: it needs the fibre distance. of_mass: a sprung mass has it as well.
-    of_contact: no motion, but the force between a carriage and its body. of_support: no motion, but what a support
+    of_contact: no motion, but the force between a carriage and its body; of_suspension: the part of it that its spring
+    and damper pass on, less what they carry at rest. of_support: no motion, but what a support
     carries; turns: its moment about a direction. of_arm: no deflection of its body, but how far a point is from where
     the rigid arm would have it, whose joints are where their motions say. of_drive: what the drive of a joint of its
     body exerts. told: its error makes no status, as forces that enter excite every mode. meant: other words for it.
@@ -45,6 +46,7 @@ class Quantity:
     needs_fibre: bool = False
     of_mass: bool = False
     of_contact: bool = False
+    of_suspension: bool = False
     of_support: bool = False
     turns: bool = False
     of_arm: bool = False
@@ -84,6 +86,7 @@ _ROWS = (
     Quantity("stress", "Pa", 2, factor=_stress, of_section=True, needs_fibre=True),
     Quantity("strain", "1", 2, factor=lambda section: -section.fibre_distance, of_section=True, needs_fibre=True),
     Quantity("contact_force", "N", of_contact=True, told=True),
+    Quantity("suspension_force", "N", of_contact=True, of_suspension=True, told=True, meant=("spring-force",)),
     Quantity("support_reaction", "N", of_support=True, meant=("reaction", "support-force", "bearing-force")),
     Quantity("support_moment", "N m", of_support=True, turns=True, meant=("clamping-moment", "fixing-moment")),
 )
@@ -91,7 +94,7 @@ _ROWS = (
 
 def _missing(piece: Any) -> list[str]:
     """What bodies, carriages and arms tell by name is the program's own."""
-    own = ("of_section", "of_contact", "of_support", "of_arm", "of_drive")
+    own = ("of_section", "of_contact", "of_suspension", "of_support", "of_arm", "of_drive")
     return no_row_of(Quantity)(piece) or [f"{key} = False" for key in own if getattr(piece, key)]
 
 

@@ -92,6 +92,16 @@ class ContactSensor(OfContact, Sensor):
         return along[self.rides(model)].on
 
 
+@dataclass(frozen=True, eq=False)
+class SuspensionSensor(ContactSensor):
+    """What the spring and the damper under a sprung mass press with beyond its weight, S of mechanics section 4."""
+
+    def missed(self, model: SceneModel, along: Along) -> Array:
+        row = np.zeros(model.ties)
+        row[list(model.springs_of(self.carriage))] = 1.0
+        return np.broadcast_to(row, (along[0].s.size, model.ties))
+
+
 def contact_row(model: SceneModel, carriage: int, contact: int | None = None) -> Array:
     """(ties,) parts of all ties' forces that make the contact force of a carriage, or that at one of its contacts."""
     found, springs = np.zeros(model.ties), model.springs_of(carriage)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.kernels.layout import Observation
-from engine.observation.contact_forces import ContactForce, ContactSensor
+from engine.observation.contact_forces import ContactForce, ContactSensor, SuspensionSensor
 from engine.observation.dynamic_part import DynamicPart
 from engine.observation.readings import Sensor, SideSensor, SpotSensor, SprungSensor
 from results_schema.arrays import Array, Counts
@@ -53,6 +53,8 @@ def _sensor(model: SceneModel, name: str, carriages: list[str]) -> Sensor:
     if spec.carriage is None or under is None:
         return Sensor(name, spec.quantity, body, at, under, limit=spec.frequency_limit)
     springs = model.springs_of(under)
+    if spec.reads.of_suspension:
+        return SuspensionSensor(name, spec.quantity, body, at, under, under, None)
     if spec.reads.of_contact:
         chosen = [rider for rider, contact in model.contact_names(under).items() if contact == spec.contact]
         return ContactSensor(name, spec.quantity, body, at, under, under, chosen[0] if chosen else None)

@@ -138,15 +138,16 @@ def check_inertia(study: Study, carriage: Carriage, direction: Direction) -> Non
 
 def _check_of_carriage(study: Study, here: str, sensor: Sensor) -> None:
     """A carriage has what a sensor of its own reads."""
-    carriage = study.carriage[str(sensor.carriage)]
-    if sensor.reads.of_contact:
+    name = str(sensor.carriage)
+    carriage = study.carriage[name]
+    if sensor.reads.of_contact and not sensor.reads.of_suspension:
         contacts = carriage.riding_contacts
         if sensor.contact is not None and sensor.contact not in contacts:
             where, expected = study.source.where(f"{here}.contact"), f"one of {', '.join(contacts)}"
             missing = "none: leave this key out" if not contacts else expected
             raise BadInput("no such contact", where=where, expected=missing, received=shortened(sensor.contact))
     elif carriage.suspension is None:
-        remedy = carriage.instead_of_own_motion(str(sensor.carriage))
+        remedy = 'quantity = "contact_force"' if sensor.reads.of_suspension else carriage.instead_of_own_motion(name)
         what = "this carriage has no sprung mass"
         raise study.source.fault(f"{here}.carriage", what, expected="an oscillator", remedy=remedy)
 

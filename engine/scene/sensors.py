@@ -181,11 +181,11 @@ class Sensor(Spec):
             known = ", ".join(name for name, q in QUANTITIES.items() if q.of_mass or q.of_contact)
             raise fault(f"a carriage has no {self.quantity}", expected=f"quantity: one of {known}")
         if self.reads.of_contact and self.carriage is None:
-            raise fault("a contact force is that of a carriage", expected='carriage = "a carriage"')
+            raise fault(f"a {self.quantity} is that of a carriage", expected='carriage = "a carriage"')
         if self.frequency_limit is not None and self.rides is not None:
             raise fault("a frequency_limit counts modes at a fixed place", expected="at, node, member or point")
         _check_limit(self.frequency_limit, self.reads)
-        if self.contact is not None and not self.reads.of_contact:
+        if self.contact is not None and (not self.reads.of_contact or self.reads.of_suspension):
             raise fault("only contact forces are read at a contact", expected='quantity = "contact_force"')
         return self
 

@@ -99,7 +99,8 @@ def check_unreduced(study: Study) -> None:
 
 def reading_contacts(study: Study) -> Study:
     """The study with sensors of all contact forces that it does not read itself."""
-    read = {(s.carriage, s.contact) for s in study.sensor.values() if s.reads.of_contact}
+    of_contact = [s for s in study.sensor.values() if s.reads.of_contact and not s.reads.of_suspension]
+    read = {(s.carriage, s.contact) for s in of_contact}
     more: dict[str, Any] = {}
     for name in study.carriage:
         own: list[str | None] = [word for owner, word, _ in contacts_of(study) if owner == name]

@@ -165,7 +165,9 @@ def rider_of(model: Unreduced, sensor: Sensor) -> int | None:
 
 
 def _counts(tie: Tie, sensor: Sensor) -> float:
-    """Part of a tie's force in a contact force: of a carriage altogether, or at one of its contacts."""
+    """Part of a tie's force in a contact force: of a carriage altogether, at one of its contacts, or of its spring."""
+    if sensor.reads.of_suspension:
+        return float(tie.link == "spring" and sensor.carriage == tie.carriage)
     wanted = sensor.carriage if sensor.contact is None else f"{sensor.carriage}_{sensor.contact}"
     return float(tie.link != "push" and wanted == (tie.carriage if sensor.contact is None else tie.name))
 

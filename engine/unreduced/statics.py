@@ -67,11 +67,12 @@ def level_state(model: Unreduced) -> tuple[Array, Array]:
 
 
 def level_readings(model: Unreduced) -> Array:
-    """(J,) what the sensors on bodies that ride and of sprung masses read there, 0 for the others."""
+    """(J,) what sensors on bodies that ride, of sprung masses and of their springs read there, 0 for the others."""
     state, forces = level_state(model)
     found = readings(model, nowhere(model)).at_rest(state[None], forces[None])[0]
     rides = [
-        not sensor.reads.of_contact and (sensor.carriage is not None or model.study.body_of(name) in model.loose)
+        sensor.reads.of_suspension
+        or (not sensor.reads.of_contact and (sensor.carriage is not None or model.study.body_of(name) in model.loose))
         for name, sensor in model.study.sensor.items()
     ]
     return np.where(np.array(rides, dtype=np.bool_), found, 0.0)

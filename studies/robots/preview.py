@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 MOST_PLANNED = 64  # variants whose cycle times are told
 MEASURED = 2  # variants by thread that are marched
+ENOUGH = 1.0  # s after which no further one is begun
 PATIENCE = 10.0  # s until some are done
 UNFINISHED = 2.0  # times these that variants take of which none was done
 AUDIT = 2.6  # times a variant that one takes in an audit: itself, and a march one level beyond in modes and steps
@@ -78,6 +79,8 @@ def foreseen(study: Study, question: Question, threads: int, audited: int) -> Fo
     begun = time.perf_counter()
 
     def job(variant: int) -> None:
+        if found and time.perf_counter() > begun + ENOUGH:
+            return
         own = cases.study_of(study, variant)
         late = begun + PATIENCE
         try:
@@ -88,7 +91,7 @@ def foreseen(study: Study, question: Question, threads: int, audited: int) -> Fo
             return
 
     some = spread(cases.size, MEASURED * threads)
-    run_jobs([partial(job, variant) for variant in some], threads)
+    run_jobs([partial(job, variant) for variant in (*some[::MEASURED], *some[1::MEASURED])], threads)
     took = time.perf_counter() - begun
     each = took / len(found) if found else UNFINISHED * took / len(some)
     marches = cases.size + (len(study.robot) if question.one_at_a_time and len(study.robot) > 1 else 0)
