@@ -24,6 +24,8 @@ from numba._dynfunc import make_function
 from numba.core.caching import IndexDataCacheFile
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
+from numba.core import types
+from numba.core.errors import TypingError
 from numba.core.registry import cpu_target
 from numba.core.typed_passes import NativeLowering
 from numba.extending import overload
@@ -124,7 +126,23 @@ def called(function: Callable[..., Any]) -> Callable[..., Any]:
         "_nrt": False,
         "pipeline_class": _PartOfKernels,
     }
-    return cast(Callable[..., Any], numba.njit(**bare, **_POLICY)(function))
+    compiled = numba.njit(**bare, **_POLICY)(function)
+    if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
+        compiled.get_call_template = _once_for_all_numbers(compiled.get_call_template)
+    return cast(Callable[..., Any], compiled)
+
+
+def _once_for_all_numbers(template: Callable[..., Any]) -> Callable[..., Any]:
+    """Compiles as ``template`` does, for the types of arguments alone. Numba's own compiles a function anew for every
+    number that a call names, which optimising it within its callers does as well."""
+
+    def of_types(args: Any, kws: Any) -> Any:
+        try:
+            return template(tuple(map(types.unliteral, args)), {name: types.unliteral(kws[name]) for name in kws})
+        except TypingError:  # of functions whose types depend on a number
+            return template(args, kws)
+
+    return of_types
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
