@@ -21,10 +21,10 @@ from typing import Any, cast
 import llvmlite.binding as llvm
 import numba
 from numba._dynfunc import make_function
+from numba.core import types
 from numba.core.caching import IndexDataCacheFile
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
-from numba.core import types
 from numba.core.errors import TypingError
 from numba.core.registry import cpu_target
 from numba.core.typed_passes import NativeLowering
