@@ -94,7 +94,11 @@ class Levels(NamedTuple):
 
 def in_full(grid: SceneGrid) -> Levels:
     """The levels with all terms, whatever the study fixes."""
-    modes, scheme = grid.mode_levels, _scheme(grid)
+    return _all_terms(grid, _scheme(grid))
+
+
+def _all_terms(grid: SceneGrid, scheme: Scheme) -> Levels:
+    modes = grid.mode_levels
     return Levels(tuple(Numerics("full", scheme, True, count, 2**level) for level, count in enumerate(modes)), "grow")
 
 
@@ -110,15 +114,22 @@ def as_fixed(grid: SceneGrid) -> Levels:
 
 
 def _scheme(grid: SceneGrid) -> Scheme:
-    """Fox-Goodwin where the modes begin few; the limit of many that a study fixes, most of which hardly move, asks for
-    more steps than average acceleration takes at the level to which most go."""
+    """Fox-Goodwin where the modes begin few and its limit, of a light part on a stiff spring say, leaves a level to
+    compare with; the limit of many modes that a study fixes, most of which hardly move, asks for more steps than
+    average acceleration takes at the level to which most go."""
     if not swift_scheme_fits(grid):
         return AVERAGE_ACCELERATION
     if open_bodies(grid.scene.study):
-        return FOX_GOODWIN
+        return next(filter(partial(_has_second_level, grid), (FOX_GOODWIN, AVERAGE_ACCELERATION)), FOX_GOODWIN)
     model = grid.model(grid.scene.numerics._replace(scheme=FOX_GOODWIN))
     usual = FIRST_PERIODS * 4.0**USUAL_LEVEL * grid.values.scene_time_scale * model.first_omega / (2.0 * np.pi)
     return FOX_GOODWIN if np.all(least_steps(model, grid.values) <= usual) else AVERAGE_ACCELERATION
+
+
+def _has_second_level(grid: SceneGrid, scheme: Scheme) -> bool:
+    """Whether some variant may march with more modes and steps than at first, without which there is no estimate."""
+    levels = _all_terms(grid, scheme)
+    return len(levels.numerics) < 2 or bool(_may_march(grid, grid.values, levels, 1).any())
 
 
 def is_free(grid: SceneGrid) -> bool:

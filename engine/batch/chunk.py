@@ -175,7 +175,8 @@ def _status(plan: Plan, group: Group, found: Found) -> NDArray[np.int8]:
     known = worst_held(found.error, results_of(plan.asked))
     # Where the study leaves nothing open, no error of its variants is the program's.
     fixed = group.grid.fixed and not group.grid.chooses
-    unknown = np.isnan(held) | (np.isnan(known) & (not fixed))
+    none = np.isnan(found.error).all(axis=0)  # also where nothing is held
+    unknown = np.isnan(held) | ((np.isnan(known) | none) & (not fixed))
     missed = np.where(unknown, np.int8(Status.UNRESOLVED), missed)
     return gravest(found.outcome.status, missed)
 

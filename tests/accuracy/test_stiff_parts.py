@@ -1,0 +1,57 @@
+"""Scenes with a part so stiff or so light that hardly any march is worth its work."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import studies
+from engine.accuracy.grids import AVERAGE_ACCELERATION
+from engine.accuracy.reference import in_full
+from engine.scene.study import Study
+from results_schema.status import Status
+from tests.accuracy.passages import only_grid
+from tests.engine.build import beam, cruise, fixed, study
+
+FORCE = {"force": {"carriage": "car", "contact": "front", "quantity": "contact_force"}}
+FREE = beam(modes="auto", damping_ratio=0.02)
+
+
+def riding(stub: float, sensors: dict[str, Any], bed: dict[str, Any] = FREE, **changes: Any) -> Study:
+    """A table on two shoes with a piece of its length (m) behind its rear end."""
+    section = {"area": 1.0, "second_moment": 1.0, "youngs_modulus": 1.0, "density": 1.0}
+    table = {
+        "kind": "frame",
+        "plane": "xz",
+        "node": {"rear": [0, 0], "front": [0.4, 0], "end": [-stub, 0]},
+        "section": {"all": section},
+        "member": {
+            "table": {"nodes": ["rear", "front"], "section": "all", "elements": 4},
+            "stub": {"nodes": ["end", "rear"], "section": "all", "elements": 2},
+        },
+        "supports": {},
+        "track": {"members": ["table"]},
+        "damping_ratio": 0.02,
+    }
+    shoe = {"stiffness": 200.0, "damping": 1.0}
+    contacts = {"front": shoe | {"at": 0.35}, "rear": shoe | {"at": 0.1}}
+    car = {"on": "bed", "kind": "body", "body": "table", "motion": cruise(0.2, 0.7, 0.5), "contacts": contacts}
+    return study(bed, {"car": car}, body={"bed": bed, "table": table}, sensor=sensors, **changes)
+
+
+def test_average_acceleration_tells_errors_where_the_limit_of_fox_goodwin_leaves_none() -> None:
+    given = riding(0.01, {"place": fixed(0.5)} | FORCE)
+    assert in_full(only_grid(given)).numerics[0].scheme == AVERAGE_ACCELERATION
+    found = studies.run(given)
+    assert found.status == Status.OK and float(found.error_estimate) <= 1e-3
+    more = {"steps": 20_000, "scheme": "average-acceleration"}
+    closer = studies.run(riding(0.01, {"place": fixed(0.5)} | FORCE, FREE | {"modes": 40}, solver=more))
+    for name in ("place_max", "force_max"):
+        assert float(found[name]) == pytest.approx(float(closer[name]), rel=2e-3)
+
+
+def test_what_nobody_could_estimate_is_unresolved_though_nothing_is_held() -> None:
+    found = studies.run(riding(1e-4, FORCE))
+    assert np.isnan(found.estimated_error).all() and np.isfinite(found.force_max)
+    assert found.status == Status.UNRESOLVED
+    assert any("1 unresolved" in text for text in studies.answer(found))
