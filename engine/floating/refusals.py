@@ -64,7 +64,7 @@ def _check_carriage(study: Study, name: str, carriage: Carriage) -> None:
         raise fault(f"{here}.kind", what, expected="mass or oscillator", received=carriage.kind)
     if not motion.slides and not motion.in_pieces:
         what = "this motion on bodies in frames that move is not built yet"
-        expected = "free, cruise, out-and-back, sinusoidal, waypoints or point-to-point"
+        expected = "free, cruise, out-and-back, sinusoidal, waypoints, point-to-point or timed-move"
         raise fault(f"{here}.motion.kind", what, expected=expected, received=motion.kind)
     if motion.legs is not None and motion.duration > MOST_CYCLES:
         what, received = "too many cycles on a body in a frame that moves", f"{motion.duration:.0f}"

@@ -180,6 +180,7 @@ _MEANT = by_other_names(
     ("force", "moving-force point-load point-force load"),
     ("mass", "moving-mass point-mass"),
     ("point-to-point", "trapezoidal trapezoid s-curve scurve ptp"),
+    ("timed-move", "move-in-time move-time timed"),
     ("cruise", "constant-speed constant linear uniform"),
 )
 

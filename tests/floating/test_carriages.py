@@ -20,6 +20,7 @@ MOTIONS = {
     "a sine that ends": {"kind": "sinusoidal", "centre": 7.0, "amplitude": 3.0, "frequency": 0.4, "cycles": 3},
     "backward cruise": {"kind": "cruise", "start": 12.0, "end": 2.0, "speed": 3.0},
     "jerk-limited": STOPPING | {"jerk": 20.0, "dwell": 0.5},
+    "in a time": {"kind": "timed-move", "start": 2.0, "end": 12.0, "time": 4.5, "dwell": 0.5},
     "a trapezoid, backward": STOPPING | {"start": 12.0, "end": 2.0},
     "too short for its speed": STOPPING | {"end": 2.5, "jerk": 20.0},
     "spline": {"kind": "waypoints", "times": [0, 2, 5], "positions": [3, 10, 4]},

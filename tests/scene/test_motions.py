@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from engine.scene.motions.along_bodies import Cruise, OutAndBack, Sinusoidal, Waypoints
 from engine.scene.motions.base import BetweenPlaces, Motion
-from engine.scene.motions.point_to_point import PointToPoint
+from engine.scene.motions.point_to_point import PointToPoint, TimedMove
 from tests.naive import motions as naive
 from tests.naive.robots_as_particles import pieces
 
@@ -57,7 +57,13 @@ moves = st.builds(
     st.none() | st.floats(0.1, 1000.0),
     st.just(0.0) | st.floats(0.01, 3.0),
 )
-laws = cruises | shuttles | sines | waypoints() | moves
+timed = st.builds(
+    lambda s, time, rest: TimedMove(kind="timed-move", time=time, dwell=rest, **s),
+    strokes(),
+    st.floats(0.1, 10.0),
+    st.just(0.0) | st.floats(0.01, 3.0),
+)
+laws = cruises | shuttles | sines | waypoints() | moves | timed
 
 
 def smooth_instants(motion: Motion, margin: float) -> np.ndarray:
@@ -184,7 +190,7 @@ def test_point_to_point(limits: tuple[float, float, float | None], start: float,
         np.testing.assert_allclose(sides[0][order], sides[1][order], rtol=0, atol=slack * scale**order * 10)
 
 
-@given(st.one_of(cruises, shuttles, moves))
+@given(st.one_of(cruises, shuttles, moves, timed))
 @settings(max_examples=60, deadline=None)
 def test_backward_is_the_same_motion_with_its_ends_exchanged(motion: BetweenPlaces) -> None:
     """To the last bit, also as pieces of time, each variant in its own direction."""
@@ -210,6 +216,19 @@ def test_backward_is_the_same_motion_with_its_ends_exchanged(motion: BetweenPlac
     np.testing.assert_array_equal(
         pieces_of(motion, 1, -1), np.concatenate([pieces_of(motion, 1), pieces_of(exchanged, 1)])
     )
+
+
+@pytest.mark.parametrize("dwell", [0.0, 0.4])
+@pytest.mark.parametrize(("start", "end"), [(0.6, 3.6), (3.6, 0.6)])
+def test_a_timed_move_has_a_constant_jerk_in_each_quarter(start: float, end: float, dwell: float) -> None:
+    time, jerk = 1.3, 32.0 / 1.3**3
+    motion = TimedMove(kind="timed-move", start=start, end=end, time=time, dwell=dwell)
+    assert motion.time_scale == pytest.approx(time + dwell, rel=1e-14)
+    assert motion.max_speed / motion.time_scale == pytest.approx(2.0 * 3.0 / time, rel=1e-12)
+    quarter, push = 0.25 * time, 0.25 * time * jerk
+    phases = [(quarter, 0.0, jerk), (quarter, push, -jerk), (quarter, 0.0, -jerk), (quarter, -push, jerk)]
+    compare_with_phases(motion, naive.point_to_point(start, end, [*phases, (dwell, 0.0, 0.0)] if dwell else phases))
+    assert [float(motion.path(tau).S) for tau in (0.0, motion.rests_from, 1.0)] == [start, end, end]
 
 
 def test_accelerations_of_a_trapezoid_are_one_sided() -> None:

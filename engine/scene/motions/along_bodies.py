@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 
 from engine.scene.motions.base import Array, BetweenPlaces, Legs, Motion, Path, Reversal, Side, both_places, two_places
 from engine.scene.motions.of_joints import AMPLITUDE, CONSTANT, PHASE, RATE, START, Number, blank, spline_pieces
-from engine.scene.motions.point_to_point import PointToPoint
+from engine.scene.motions.point_to_point import PointToPoint, TimedMove
 from engine.study_file.checks import Check, on_body
 from engine.study_file.spec import Hint, KindOf, Several, kinds
 from engine.study_file.units import Damping, Dimensionless, Force, Frequency, Length, Speed, Time, fault
@@ -320,7 +320,7 @@ class Sliding(Motion):
         return Path(np.full_like(tau, self.start), np.zeros_like(tau), np.zeros_like(tau))
 
 
-ALL = (Cruise, OutAndBack, Sinusoidal, Waypoints, PointToPoint, Sliding)
+ALL = (Cruise, OutAndBack, Sinusoidal, Waypoints, PointToPoint, TimedMove, Sliding)
 MOTIONS = kinds("motion", "wanderlast.motions", Motion, *ALL)
 AnyMotion = Annotated[Motion, KindOf("motion", MOTIONS)]
 

@@ -1,11 +1,12 @@
-"""From rest to rest over a distance as fast as limits of speed, acceleration and jerk allow: of a carriage."""
+"""From rest to rest over a distance, of a carriage: within limits of speed, acceleration and jerk, or in a time."""
 
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Mapping
 from functools import cached_property, lru_cache
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,29 +19,13 @@ from engine.study_file.checks import Check, on_body
 from engine.study_file.units import Acceleration, Jerk, Speed, Time
 
 
-class PointToPoint(BetweenPlaces):
-    """From rest at the start to rest at the end within limits of speed, acceleration and jerk, then `dwell` seconds of
-    rest there. tau = 1 is all of it.
-
-    Without a jerk the speed is a trapezoid. Where the way is too short for the speed, or the speed for the
-    acceleration, these are not reached (`profile`).
-
-    >>> move = PointToPoint(kind="point-to-point", start=1.0, end=3.0, speed=1.0, acceleration=2.0, dwell=0.5)
-    >>> move.time_scale, move.path([0.0, 0.5, 1.0]).S.tolist()
-    (3.0, [1.0, 2.25, 3.0])
-    """
+class FromRestToRest(BetweenPlaces):
+    """From rest at the start to rest at the end, then `dwell` seconds of rest there. tau = 1 is all of it."""
 
     ends = ("start", "end")
     in_pieces = True
-    kind: Literal["point-to-point"]
-    speed: Speed = Field(gt=0)
-    acceleration: Acceleration = Field(gt=0)
-    jerk: Jerk | None = Field(default=None, gt=0)
+    kind: str
     dwell: Time = Field(default=0.0, ge=0)
-
-    @property
-    def smoothed_by(self) -> str:
-        return "" if self.jerk else "jerk"
 
     @property
     def time_scale(self) -> float:
@@ -54,14 +39,9 @@ class PointToPoint(BetweenPlaces):
     def rests_from(self) -> float:
         return float(self._bounds[-1])
 
-    @property
-    def reached(self) -> Mapping[str, float]:
-        top = abs(self.end - self.start) * self._move.top_speed
-        return {"speed": top, "acceleration": top / (self._move.up_time - self._move.jerk_time)}
-
     def checks(self, here: str, length: str) -> list[Check]:
         start, end = f"{here}.start", f"{here}.end"
-        what = "a point-to-point path must stay on its body"
+        what = f"a {self.kind} path must stay on its body"
         return [two_places(start, end), *(on_body(key, (key, length), what) for key in (start, end))]
 
     def breaks(self) -> Array:
@@ -106,13 +86,10 @@ class PointToPoint(BetweenPlaces):
             return Path(last - way * gone, way * scale * rate, -way * scale**2 * push)
         return Path(first + way * gone, way * scale * rate, way * scale**2 * push)
 
-    def pieces(self, number: Number) -> Array:
-        return move_pieces(*both_places(number), number)
-
-    @cached_property
+    @property
+    @abstractmethod
     def _move(self) -> Profile:
-        jerk = math.inf if self.jerk is None else self.jerk
-        return profile(abs(self.end - self.start), self.speed, self.acceleration, jerk)
+        """How fast it goes, over a way of unit length."""
 
     @property
     def _pieces(self) -> Array:
@@ -123,6 +100,65 @@ class PointToPoint(BetweenPlaces):
     def _bounds(self) -> Array:
         """(7,) tau at which its phases end."""
         return _tables(self._move)[1] / self.time_scale
+
+
+class PointToPoint(FromRestToRest):
+    """Within limits of speed, acceleration and jerk. Without a jerk the speed is a trapezoid. Where the way is too
+    short for the speed, or the speed for the acceleration, these are not reached (`profile`).
+
+    >>> move = PointToPoint(kind="point-to-point", start=1.0, end=3.0, speed=1.0, acceleration=2.0, dwell=0.5)
+    >>> move.time_scale, move.path([0.0, 0.5, 1.0]).S.tolist()
+    (3.0, [1.0, 2.25, 3.0])
+    """
+
+    kind: Literal["point-to-point"]
+    speed: Speed = Field(gt=0)
+    acceleration: Acceleration = Field(gt=0)
+    jerk: Jerk | None = Field(default=None, gt=0)
+
+    @property
+    def smoothed_by(self) -> str:
+        return "" if self.jerk else "jerk"
+
+    @property
+    def reached(self) -> Mapping[str, float]:
+        top = abs(self.end - self.start) * self._move.top_speed
+        return {"speed": top, "acceleration": top / (self._move.up_time - self._move.jerk_time)}
+
+    def pieces(self, number: Number) -> Array:
+        return move_pieces(*both_places(number), number)
+
+    @cached_property
+    def _move(self) -> Profile:
+        jerk = math.inf if self.jerk is None else self.jerk
+        return profile(abs(self.end - self.start), self.speed, self.acceleration, jerk)
+
+
+class TimedMove(FromRestToRest):
+    """In so many seconds, the jerk constant in each quarter of them: over a way D in T it reaches a speed of 2 D/T, an
+    acceleration of 8 D/T^2 and a jerk of 32 D/T^3.
+
+    >>> move = TimedMove(kind="timed-move", start=1.0, end=3.0, time=2.0, dwell=2.0)
+    >>> move.time_scale, move.path([0.0, 0.125, 0.25, 0.5, 1.0]).S.round(12).tolist()
+    (4.0, [1.0, 1.166666666667, 2.0, 3.0, 3.0])
+    """
+
+    kind: Literal["timed-move"]
+    time: Time = Field(gt=0)
+
+    def pieces(self, number: Number) -> Array:
+        start, end = both_places(number)
+        return move_pieces(start, end, _limits(np.abs(end - start), number("time")).__getitem__)
+
+    @cached_property
+    def _move(self) -> Profile:
+        way = abs(self.end - self.start)
+        return profile(way, **_limits(way, self.time))
+
+
+def _limits(way: Any, time: Any) -> dict[str, Any]:
+    """What a move in a time reaches, which it takes as limits."""
+    return {"speed": 2.0 * way / time, "acceleration": 8.0 * way / time**2, "jerk": 32.0 * way / time**3}
 
 
 @lru_cache(maxsize=256)
