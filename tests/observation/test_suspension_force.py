@@ -42,6 +42,28 @@ def test_the_unreduced_model_reads_the_same() -> None:
     assert max(apart(given.with_values({"body.bed.modes": 30})).values()) < 3e-4
 
 
+def test_a_coach_on_its_wheels_is_as_many_sprung_masses() -> None:
+    """A rigid body with half of its mass over each of two suspensions, whose wheels are carriages of their own."""
+    base, spring = 0.2, {"stiffness": 40.0, "damping": 1.5}
+    ways = {"front": cruise(0.0, 1.2, 0.5), "rear": cruise(-base, 1.0, 0.5)}
+    table = {"kind": "rigid", "length": 0.3, "mass": 2.0 * MASSES[0], "inertia": 2.0 * MASSES[0] * (0.5 * base) ** 2}
+    contacts = {"front": spring | {"at": 0.15 + 0.5 * base}, "rear": spring | {"at": 0.15 - 0.5 * base}}
+    coach = {"on": "bed", "kind": "body", "body": "table", "contacts": contacts, "motion": cruise(-0.1, 1.1, 0.5)}
+    bed, more = beam(modes=12), {"solver": {"steps": 2000, "tolerance": 0.5}, "output": {"histories": "all"}}
+    sensors = {name: {"carriage": "coach", "contact": name, "quantity": "contact_force"} for name in ways}
+    wheels = {f"{name}_wheels": mass(WHEEL, way) for name, way in ways.items()}
+    sensors |= {"middle": fixed(0.5)}
+    whole = study(bed, {"coach": coach} | wheels, body={"bed": bed, "table": table}, sensor=sensors, **more)
+    axles = {name: oscillator(MASSES[0], motion=way, wheel_mass=WHEEL, **spring) for name, way in ways.items()}
+    read = {name: aboard(name, "suspension_force") for name in ways} | {"middle": fixed(0.5)}
+    found, single = (engine.run(given) for given in (whole, study(bed, axles, sensor=read, **more)))
+    np.testing.assert_allclose(found.middle, single.middle, rtol=0.0, atol=1e-12)
+    for name in ways:
+        beyond = found[name].values - GRAVITY * MASSES[0]
+        np.testing.assert_allclose(beyond, single[name].values, rtol=0.0, atol=1e-9 * np.nanmax(np.abs(beyond)))
+        assert np.nanmax(np.abs(beyond)) > 0.05 * GRAVITY * MASSES[0]
+
+
 def test_an_answer_names_it_and_it_has_no_static_value() -> None:
     found = studies.run(crossing({"spring": READ["spring"]}))
     assert "the largest suspension force of car is" in " ".join(studies.answer(found))
