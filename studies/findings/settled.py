@@ -25,7 +25,6 @@ PLACES = 65  # along the way, at the heaviest of which the mass stands: there th
 ENDS = (
     (".motion.speed", np.min, "from {} on"),
     (".motion.frequency", np.min, "from {} on"),
-    (".motion.time", np.max, "up to {}"),
     (".damping_ratio", np.max, "up to {}"),
 )
 
