@@ -94,7 +94,7 @@ class ContactSensor(OfContact, Sensor):
 
 @dataclass(frozen=True, eq=False)
 class SuspensionSensor(ContactSensor):
-    """What the spring and the damper under a sprung mass press with beyond its weight, S of mechanics section 4."""
+    """What spring and damper under a sprung mass press with beyond its weight (mechanics section 4, compliant tie)."""
 
     def missed(self, model: SceneModel, along: Along) -> Array:
         row = np.zeros(model.ties)

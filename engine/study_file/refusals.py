@@ -109,7 +109,7 @@ def value_at(data: Any, keys: Keys) -> Any:
 def refuse(error: ValidationError, model: type[Spec], data: Any, source: Source) -> NoReturn:
     """Raise the one BadInput that helps most: an unknown key first, since it often explains a missing one."""
     details = sorted(error.errors(include_url=False), key=lambda item: item["type"] != "extra_forbidden")
-    raise bad_input(details[0], model, data, source) from None  # which says all that pydantic does
+    raise bad_input(details[0], model, data, source) from None  # it says all that pydantic's error does
 
 
 def bad_input(detail: Any, model: type[Spec], data: Any, source: Source) -> BadInput:
