@@ -156,8 +156,9 @@ def converge(
         if not active.size:
             break
     assert found is not None
-    none_held = ~np.any(np.isfinite([result.tolerance for result in results]))
-    unresolved = np.isnan(held) & ~none_held
+    some_held = np.any(np.isfinite([result.tolerance for result in results]))
+    # where nothing is held, the steps that a study fixes are its own affair
+    unresolved = np.isnan(held) & (some_held or study.solver.steps == "auto")
     missed = np.where(held > 1.0, np.int8(Status.TOLERANCE_MISSED), np.int8(Status.OK))
     status = np.where(unresolved, np.int8(Status.UNRESOLVED), missed)
     error[:, lost(found.status)] = np.nan

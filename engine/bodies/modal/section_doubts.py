@@ -28,12 +28,12 @@ class Doubt(Check):
 
     def meant(self, values: Mapping[str, Any]) -> str:
         """The number with other units that make it likely, as a question, or ""."""
-        number, texts = self.needs[0], list[str]()
+        number, likely = self.needs[0], list[str]()
         for other in self.others:
             typed, _, thought = other.rpartition("=")
-            size = self.unit.si(f"1 {typed}") if typed else 1.0
-            texts.append(f"{values[number] / size:.6g} {thought}")
-        likely = [f'"{text}"' for text in texts if self.met({**values, number: self.unit.si(text)})]
+            amount = values[number] / (self.unit.si(f"1 {typed}") if typed else 1.0)
+            if self.met({**values, number: amount * self.unit.si(f"1 {thought}")}):
+                likely.append(f'"{amount:.6g} {thought}"')
         return f"did you mean {' or '.join(likely)}?" if likely else ""
 
 

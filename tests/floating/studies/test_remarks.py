@@ -37,6 +37,9 @@ SAID = {
     'body.arm.youngs_modulus = 70 Pa: no beam has this, expected 1e5 to 2e12 Pa, steel 2.1e11; did you mean "70 GPa"': (
         driven(arm={"youngs_modulus": 70.0})
     ),
+    "body.arm.youngs_modulus = 7e+22 Pa: no beam has this, expected 1e5 to 2e12 Pa, steel 2.1e11; is the unit": (
+        driven(arm={"youngs_modulus": 7e22})
+    ),
     'frame.arm.joints.0.motion.values.1 = 45 rad is 7.16 turns: is "45 deg" meant?': turned_to(0, 45),
     'frame.arm.joints.0.motion.values.1 = -30 rad is 4.77 turns: is "-30 deg" meant?': turned_to(
         0, -1, sweep={"v": {"of": "frame.arm.joints.0.motion.values.1", "values": [-1, -30]}}
