@@ -160,7 +160,7 @@ def test_numbers_and_units() -> None:
         ('under = "table"', 'under = "table"\nat = 1.0', ["sensor.table_moment", "exactly one"]),
         ("at = 7.5", "at = 15.5", ["sensor.midspan.at", "15.5", "body.bed.length = 15"]),
         ("at = 14.9", "at = 15.1", ["body.bed.supports.1.at", "off the beam"]),
-        ('stiffness = "200 kN/mm"', "stiffness = 0", ["body.bed.supports.1", "holds nothing"]),
+        ('stiffness = "200 kN/mm"', "stiffness = 0", ["body.bed.supports.1", "holds nothing", "make a frame's node"]),
         ("end = 14.7", "end = 15.1", ["carriage.table.motion.end", "stay on its body"]),
         ("end = 14.7", "end = 7.5", ["carriage.table.motion.end", "same place"]),
         ("amplitude = 7.0", "amplitude = 7.6", ["carriage.probe.motion", "stay on its body"]),

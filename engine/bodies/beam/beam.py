@@ -206,7 +206,6 @@ class Beam(Body):
             spring = f"{here}.supports.{index}"
             parts = tuple(f"{spring}.{key}" for key in ("stiffness", "rotational", "damping"))
             checks.append(on_body(f"{spring}.at", (f"{spring}.at", f"{here}.length"), "a support off the beam"))
-            checks.append(
-                Check(spring, parts, lambda k, r, c: k + r + c > 0, "a support that holds nothing", "one of them > 0")
-            )
+            what, remedy = "a support that holds nothing", "of a support that does not give way make a frame's node"
+            checks.append(Check(spring, parts, lambda k, r, c: k + r + c > 0, what, "one of them > 0", remedy=remedy))
         return checks

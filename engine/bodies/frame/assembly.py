@@ -198,8 +198,8 @@ def _held(frame: Frame, mesh: Mesh, nodes: dict[str, int]) -> NDArray[np.bool_]:
     held = np.zeros((len(mesh.points), 6), dtype=np.bool_)
     for word in frame.still:
         held[:, DIRECTIONS.index(word)] = True
-    for name in frame.supports:
-        for word in frame.holds(name):
+    for name in frame.node:
+        for word in frame.stands(name):
             held[nodes[name], DIRECTIONS.index(word)] = True
     return held.reshape(-1)
 

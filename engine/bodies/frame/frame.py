@@ -273,6 +273,16 @@ class Frame(Body):
         support = self.supports.get(node, ())
         return HELD_AT[support] if isinstance(support, str) else support
 
+    def stands(self, node: str) -> Sequence[str]:
+        """The directions in which a node stays where it is: where it is held; of one at which no member ends, as of a
+        tuned mass, also those in which no spring acts on it."""
+        if any(node in member.nodes for member in self.member.values()):
+            return self.holds(node)
+        springs = [spring for spring in self.spring.values() if node in (spring.node, spring.to)]
+        rates = [(*spring.stiffness, *spring.rotational) for spring in springs]
+        idle = [way for way, own in zip(DIRECTIONS, zip(*rates, strict=True), strict=True) if not any(own)]
+        return tuple(dict.fromkeys((*self.holds(node), *idle)))
+
     @property
     def track_ends(self) -> tuple[str, ...]:
         (first, first_turned), (last, last_turned) = self.line.members[0], self.line.members[-1]

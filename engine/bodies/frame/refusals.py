@@ -120,7 +120,7 @@ def _check_connected(frame: Frame) -> None:
     links += [(spring.node, spring.to) for spring in frame.spring.values() if spring.to is not None]
     for name in frame.node:
         if not any(name in member.nodes for member in frame.member.values()):
-            refuse(("node", name), "no member ends at this node", remedy="leave it out, or add a member")
+            _check_tuned_mass(frame, name)
     reached, border = set(), {next(iter(frame.node))}
     while border:
         reached |= border
@@ -132,6 +132,27 @@ def _check_connected(frame: Frame) -> None:
     total = sum(member.elements for member in frame.member.values())
     if total > MAX_TOTAL_ELEMENTS:
         refuse(("member",), "too many elements", expected=f"at most {MAX_TOTAL_ELEMENTS}", received=str(total))
+
+
+def _check_tuned_mass(frame: Frame, node: str) -> None:
+    """A node at which no member ends has a mass on springs, in every direction in which anything acts on it."""
+    masses = [body for body in frame.point_mass.values() if body.node == node]
+    springs = {name: spring for name, spring in frame.spring.items() if node in (spring.node, spring.to)}
+    if not (masses and springs):
+        remedy = "leave it out, or add a member, or a point_mass and a spring to another node"
+        refuse(("node", node), "no member ends at this node", remedy=remedy)
+    stands = frame.stands(node)
+    for name, spring in springs.items():
+        for way, rate in zip(DIRECTIONS, (*spring.damping, *spring.rotational_damping), strict=True):
+            if rate > 0.0 and way in stands and way not in (*frame.holds(node), *frame.still):
+                key = ("spring", name, "damping" if way in DIRECTIONS[:3] else "rotational_damping")
+                expected = f"a stiffness along {way} too" if way in DIRECTIONS[:3] else f"a stiffness {way} too"
+                refuse(key, f"a damper without a spring holds {node}, at which no member ends", expected=expected)
+    for way in DIRECTIONS[3:]:
+        inertias = [body.inertia[DIRECTIONS.index(way) - 3] for body in masses]
+        if way not in (*stands, *frame.still) and not any(inertias):
+            what = f"a spring turns {node}, which has no inertia about {way[1]}, and at which no member ends"
+            refuse(("node", node), what, expected=f"an inertia about {way[1]} of its point_mass, or no such spring")
 
 
 def _check_springs(frame: Frame) -> None:
@@ -226,7 +247,7 @@ def check_spot(frame: Frame, spot: Spot) -> None:
     if spot.support:
         _check_support(frame, spot)
         return
-    held = frame.still if spot.node is None else (*frame.still, *frame.holds(str(spot.node)))
+    held = frame.still if spot.node is None else (*frame.still, *frame.stands(str(spot.node)))
     way = unit(frame.gravity if spot.direction is None else spot.direction)
     if spot.point is None and not any(way[axis] for axis, word in enumerate("xyz") if word not in held):
         what = "nothing moves here in this direction"
