@@ -124,7 +124,7 @@ def converge(
 ) -> Converged:
     """March variants of one scene level by level; duration (V,) s, the longest of all variants of the scene, and its
     model. Where the study fixes the steps, these are marched, and twice as many to tell the error. Raises Halted."""
-    V = values.size
+    study, V = rung.of(study), values.size
     found: Outcome | None = None
     active = np.arange(V)
     for level in islice(levels(study, longest, rung.modes), LEVELS if study.solver.steps == "auto" else 2):
@@ -178,7 +178,7 @@ def observed(
     more modes where these are open. Raises Halted."""
     found = converge(study, values, duration, longest, rung, halted)
     apart, left = np.full_like(found.error, np.nan), ~lost(found.status)
-    for level in levels(study, longest, MORE_MODES * rung.modes):
+    for level in levels(rung.of(study), longest, MORE_MODES * rung.modes):
         lanes = np.flatnonzero(left & (found.steps < level.steps))
         if halted():
             raise Halted

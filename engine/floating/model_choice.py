@@ -4,8 +4,8 @@ equations, if it agrees with the floating frame."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -37,13 +37,18 @@ FIRST_MODES, MOST_MODES = 2, 32  # of bending, of a beam
 @dataclass(frozen=True, eq=False)
 class Rung:
     """The model of a scene's variants; modes: of bending, where these are open; left_out (R,): largest error of every
-    result, among pilots, by the model and these modes; by_fixed: of pilots by modes and elements that the study fixes,
-    which is told and not held."""
+    result, among pilots, by the model and these modes; by_fixed: of pilots by modes, elements and a lack of stiffening
+    that the study fixes, which is told and not held; stiffened: bodies that it leaves open, and which are."""
 
     fidelity: Fidelity
     modes: int
     left_out: Array
     by_fixed: FewPilots
+    stiffened: tuple[str, ...]
+
+    def of(self, study: Study) -> Study:
+        """The study with these bodies stiffened."""
+        return _stiffened(study, self.stiffened)
 
 
 class Pilots(NamedTuple):
@@ -53,6 +58,10 @@ class Pilots(NamedTuple):
     values: VariantValues
     duration: Array
     longest: float
+
+    def stiffened(self, names: Iterable[str]) -> Pilots:
+        """The same with some bodies stiffened."""
+        return self._replace(study=_stiffened(self.study, names))
 
     def march(self, level: Level, fidelity: Fidelity = Fidelity.FRAME) -> Outcome:
         """What they report by a level."""
@@ -65,10 +74,13 @@ def choose(study: Study, pilots: VariantValues, duration: Array, longest: float)
     longest: of all variants (s)."""
     own = Pilots(study, pilots, duration, longest)
     modes, left_out = _enough_modes(own)
+    fixed = _by_lack_of_stiffening(own, modes, may_stiffen(study, said=False))
+    stiffened, by_lack = _those_that_stiffen(own, modes)
+    study, own, left_out = _stiffened(study, stiffened), own.stiffened(stiffened), left_out + by_lack
     level = next(iter(levels(study, longest, modes)))
     model, results = level.model, results_of(level.model)
-    by_fixed = FewPilots(pilots.columns, _by_fixed_modes(own, modes) + _by_elements(own, modes))
-    full = Rung(Fidelity.FRAME, modes, left_out, by_fixed)
+    by_fixed = FewPilots(pilots.columns, fixed + _by_fixed_modes(own, modes) + _by_elements(own, modes))
+    full = Rung(Fidelity.FRAME, modes, left_out, by_fixed, stiffened)
     if study.solver.fidelity == "full" or not is_given(model, pilots):
         return full
     cheap, dear = (own.march(level, fidelity) for fidelity in (Fidelity.GIVEN_FRAME, Fidelity.FRAME))
@@ -76,7 +88,51 @@ def choose(study: Study, pilots: VariantValues, duration: Array, longest: float)
     known = ~np.isnan(apart).any(axis=0)  # what the floating frame itself has no values of tells nothing
     if not known.any() or (worst(apart, results, pilots)[known] > PART).any():
         return full
-    return Rung(Fidelity.GIVEN_FRAME, modes, left_out + apart[:, known].max(axis=1), by_fixed)
+    return replace(full, fidelity=Fidelity.GIVEN_FRAME, left_out=left_out + apart[:, known].max(axis=1))
+
+
+def may_stiffen(study: Study, *, said: bool | None = None) -> tuple[str, ...]:
+    """Bodies that what pulls at them would stiffen as they move, of which the study says nothing, or that they do
+    not."""
+    bodies = build(study, FIRST_MODES).bodies
+    frames = {name: frame for name, frame in study.frame.items() if name in bodies and frame.stiffening is said}
+    able = [name for name, frame in frames.items() if not (frame.stands or frame.torsion_modes)]
+    return tuple(name for name in able if bodies[name].shortening is not None and bodies[name].omega.size)
+
+
+def _stiffened(study: Study, names: Iterable[str]) -> Study:
+    """The study with some bodies stiffened by what pulls at them."""
+    frames = {name: study.frame[name].model_copy(update={"stiffening": True}) for name in names}
+    return study.model_copy(update={"frame": {**study.frame, **frames}}) if frames else study
+
+
+def _those_that_stiffen(pilots: Pilots, modes: int) -> tuple[tuple[str, ...], Array]:
+    """The bodies that are left open, if it changes what is held by more than a small part of the tolerance in any pilot
+    that they stiffen, else none; and by how much it changes results (R,) then."""
+    names, results = may_stiffen(pilots.study), results_of(build(pilots.study, modes))
+    apart = _by_lack_of_stiffening(pilots, modes, names)
+    if (worst(apart, results, pilots.values) > PART).any():
+        return names, np.zeros(len(results))
+    return (), apart.max(axis=1)
+
+
+def _by_lack_of_stiffening(pilots: Pilots, modes: int, names: tuple[str, ...]) -> Array:
+    """(R, P) by how much it changes results of pilots that some bodies are stiffened; infinite where it decides whether
+    they have any, and nothing where they have none with stiffening either."""
+    model = build(pilots.study, modes)
+    found: Array = np.zeros((len(results_of(model)), pilots.values.size))
+    if not names:
+        return found
+    stiff = pilots.stiffened(names)
+    for factor in FINER:
+        steps = usual_steps(model, pilots.longest) * factor
+        plain, other = (
+            one.march(Level(build(one.study, modes), steps, steps // STATIONS, UNLIMITED)) for one in (pilots, stiff)
+        )
+        found = differences(model, plain, other)
+        if not np.isnan(found).all(axis=1).any():
+            break
+    return np.where(np.isnan(found), 0.0, found)
 
 
 def _enough_modes(pilots: Pilots) -> tuple[int, Array]:

@@ -186,7 +186,8 @@ class Frame(Spec):
     its pitch inertia in all directions if not given. lateral_second_moment, lateral_modes: bending across the track;
     its supports are those of bending. axial_modes: stretching; torsion_modes, with shear_modulus and torsion_constant:
     twisting; both held where the track begins, unless both its ends are free. stiffening: places come nearer as the
-    body bends, so that what pulls at them stiffens it (first order).
+    body bends, so that what pulls at them stiffens it (first order); left out, where that changes results by what
+    counts.
     """
 
     on: Annotated[str, Noun('"ground" or the name of a body')] = GROUND
@@ -201,7 +202,7 @@ class Frame(Spec):
     torsion_constant: SecondMoment | None = Field(default=None, gt=0)
     shear_modulus: Pressure | None = Field(default=None, gt=0)
     torsion_modes: int = Field(default=0, ge=0, le=32)
-    stiffening: bool = False
+    stiffening: bool | None = None
 
     @property
     def stands(self) -> bool:

@@ -17,6 +17,7 @@ from studies.results.formatting import percent, quantity
 from studies.results.places import spread
 
 if TYPE_CHECKING:
+    from engine.floating.bodies.elastic import ElasticBody
     from engine.floating.model import FloatingModel
     from engine.scene.study import Study
     from engine.scene.sweep import Cases
@@ -75,6 +76,7 @@ def remarks(study: Study, duration: Callable[[Mapping[str, Array], int], Array])
 
 def _turned_fast(looked: Looked) -> Iterator[str]:
     """Bodies that given motions alone turn beyond the theory, with the largest rate."""
+    from engine.floating.model_choice import may_stiffen
     from engine.floating.theory import MISSING, given_rates, lacking
 
     worst: dict[str, tuple[float, float]] = {}
@@ -83,8 +85,9 @@ def _turned_fast(looked: Looked) -> Iterator[str]:
         for name in model.bodies:
             rate = float(rates[name].max())
             worst[name] = max(worst.get(name, (0.0, 0.0)), (float(lacking(model, name).max()) * rate**2, rate))
+    left_open = may_stiffen(looked.study)
     for name, (missing, rate) in worst.items():
-        if missing > MISSING:
+        if missing > MISSING and name not in left_open:
             yield (
                 f"{name} is turned with up to {quantity(rate, 'rad s-1')}, at which it lacks {percent(missing)} of its "
                 f"stiffness, as frame.{name}.stiffening is off: such variants are beyond the theory, or diverge"
@@ -205,6 +208,29 @@ def _stays_in_plane(model: FloatingModel, name: str) -> bool:
     return bool(kept and flat and not np.delete(turned, Y).any())
 
 
+def _moved_across(looked: Looked) -> Iterator[str]:
+    """Joints that push a body across the plane in which alone it bends."""
+    from engine.kernels.floating.layout import PRISMATIC, REVOLUTE
+
+    model, across, count = looked.samples[0].model, {REVOLUTE: Z, PRISMATIC: Y}, dict[str, int]()
+    for joint in model.joints:
+        number = count[joint.body] = count.get(joint.body, -1) + 1
+        body, axis = model.bodies[joint.body], across.get(joint.kind)
+        if axis is None or not body.omega.size or abs(joint.axis[axis]) < 1.0 - ROUNDING or _bends_along_y(body):
+            continue
+        how = "turns" if joint.kind == REVOLUTE else "pushes"
+        yield (
+            f"frame.{joint.body}.joints.{number} {how} {joint.body} across the plane in which it bends: lateral_modes "
+            f"of frame.{joint.body}, with its lateral_second_moment, let it bend along y too"
+        )
+
+
+def _bends_along_y(body: ElasticBody) -> bool:
+    """Whether it bends across the plane of its loads."""
+    shapes = np.abs(body.fields(np.linspace(0.0, body.length, PLACES), (0,))[0]).max(axis=(0, 2), initial=0.0)
+    return bool(shapes[Y] > ROUNDING * shapes.max())
+
+
 def _let_go(looked: Looked) -> Iterator[str]:
     """Bodies that lie across gravity and could rest on their joints."""
     study, model = looked.study, looked.samples[0].model
@@ -250,5 +276,6 @@ def _doubtful(looked: Looked) -> Iterator[str]:
 
 REMARKS: tuple[Callable[[Looked], Iterator[str]], ...]
 REMARKS = (
-    _doubtful, _degrees, _turned_fast, _over_an_end, _goes_on, _stands, _reads_nothing, _nothing_across, _let_go,
+    _doubtful, _degrees, _turned_fast, _over_an_end, _goes_on, _stands, _reads_nothing, _nothing_across, _moved_across,
+    _let_go,
 )  # fmt: skip

@@ -66,7 +66,7 @@ def test_the_warning_comes_before_the_march_diverges() -> None:
 def test_variants_beyond_the_theory_keep_their_values() -> None:
     """A slow rate is fine, a middle one is marked, a fast one diverges; stiffened all are fine."""
     sweep = {"rate": {"of": "frame.arm.joints.0.motion.rate", "values": RATES}}
-    expected = spin_up(16.0, {}, sweep=sweep, expected=["beyond-theory", "diverged"])
+    expected = spin_up(16.0, {"stiffening": False}, sweep=sweep, expected=["beyond-theory", "diverged"])
     found = studies.run(expected)
     assert found["status"].values.tolist() == [Status.OK, Status.BEYOND_THEORY, Status.DIVERGED]
     assert np.isfinite(found["tip_max"]).values.tolist() == [True, True, False]
@@ -74,24 +74,45 @@ def test_variants_beyond_the_theory_keep_their_values() -> None:
     said = [line for line in KIND.findings(Results.of(found)) if "beyond the theory" in line]
     assert "in 2 variants of 3" in said[0]
     assert "in 1 variant of 3" in said[1]
-    stiff = studies.run(spin_up(16.0, {"stiffening": True}, sweep=sweep))
+    stiff, open_ = (studies.run(spin_up(16.0, own, sweep=sweep)) for own in ({"stiffening": True}, {}))
     assert (stiff["status"] == Status.OK).all()
     assert np.isnan(stiff["unstiffened_time"]).all()
+    for name in stiff.data_vars:  # left open, it is taken where it counts
+        np.testing.assert_array_equal(open_[name].values, stiff[name].values, err_msg=str(name))
 
 
 def test_check_says_so_before_anything_is_marched() -> None:
     """The largest rate of given motions, of a body and of what holds it; nothing where it is slow, or stiffened."""
     sweep = {"rate": {"of": "frame.arm.joints.0.motion.rate", "values": RATES}}
-    (said,) = KIND.remarks(spin_up(20.0, {}, sweep=sweep))
+    off = {"stiffening": False}
+    (said,) = KIND.remarks(spin_up(20.0, off, sweep=sweep))
     lacks = lacking(build(spin_up(20.0, {})), "arm").max() * 36.0
     assert lacks == pytest.approx(3.0, rel=0.02)
     assert "up to 6 rad/s" in said and "lacks 300 % of its stiffness" in said
-    assert KIND.remarks(spin_up(20.0, {"stiffening": True})) == ()
-    assert not any("lacks" in said for said in KIND.remarks(spin_up(2.0, {})))  # it has hardly begun to turn
+    assert KIND.remarks(spin_up(20.0, {"stiffening": True})) == KIND.remarks(spin_up(20.0, {})) == ()
+    assert not any("lacks" in said for said in KIND.remarks(spin_up(2.0, off)))  # it has hardly begun to turn
     hub = {"kind": "rigid", "length": 1.0, "mass": 1.0, "inertia": 1.0}
-    frames = {"hub": {"joints": [SPIN_UP]}, "arm": {"on": "hub"}}
+    frames = {"hub": {"joints": [SPIN_UP]}, "arm": {"on": "hub"} | off}
     (said,) = KIND.remarks(spin_up(20.0, {}, body={"hub": hub, "arm": ARM}, frame=frames))
     assert said.startswith("arm is turned with up to 6 rad/s")
+
+
+def test_stiffening_is_taken_where_it_counts_and_told_where_it_is_refused() -> None:
+    """A quarter turn in three first periods, and the swing after it."""
+    turn = {"kind": "waypoints", "times": [0.0, 5.0], "values": [0.0, -1.57]}
+    slow = turn | {"times": [0.0, 300.0]}
+    arm = {"joints": [{"kind": "revolute", "axis": [0, 1, 0], "motion": turn}]}
+    damped = {"arm": ARM | {"modes": 2, "damping_ratio": 0.01}}
+    open_, refused, stiff = (
+        studies.run(spin_up(10.0, arm | own, body=damped)) for own in ({}, {"stiffening": False}, {"stiffening": True})
+    )
+    assert float(open_.tip_max) == float(stiff.tip_max)
+    off = abs(float(refused.tip_max - stiff.tip_max)) / float(stiff.tip_max)
+    told = float(refused.estimated_error.sel(result="tip_max"))
+    assert 2e-3 < off < told < 20.0 * off and refused.status == Status.OK
+    gentle = spin_up(300.0, {"joints": [arm["joints"][0] | {"motion": slow}]}, body=damped)
+    left_open, said = (studies.run(one) for one in (gentle, gentle.with_values({"frame.arm.stiffening": False})))
+    assert float(left_open.tip_max) == float(said.tip_max)
 
 
 def test_what_bends_far_is_marked() -> None:

@@ -154,7 +154,7 @@ def elastic_beam(body: Beam, frame: Frame, modes: int | None, where: str, hung: 
         along,
         body.build(),
         BeamShortening(along, x, dm),
-        frame.stiffening,
+        bool(frame.stiffening),
     )
 
 

@@ -58,7 +58,7 @@ def elastic_frame(body: FrameBody, frame: Frame, modes: int | None, where: str, 
         along=track.moving(nodal),
         modal=modal,
         shortening=FrameShortening(own, assembly, nodal, track, origin),
-        stiffens=frame.stiffening,
+        stiffens=bool(frame.stiffening),
         slender=False,
     )
 

@@ -56,8 +56,8 @@ def test_told_errors_are_above_those_beside_many_elements(elements: int) -> None
     pilots = np.linspace(0, VARIANTS - 1, 16).astype(np.int64)
     rung = choose(scene, values.part(pilots), duration[pilots], TIME)
     found = converge(scene, values, duration, TIME, rung)
-    fine = [level for level in levels(scene, TIME, rung.modes) if level.steps >= found.steps.max()][1]
-    whole = Level(build(many.without_sweep(), rung.modes), fine.steps, fine.every, fine.scheme)
+    fine = [level for level in levels(rung.of(scene), TIME, rung.modes) if level.steps >= found.steps.max()][1]
+    whole = Level(build(rung.of(many.without_sweep()), rung.modes), fine.steps, fine.every, fine.scheme)
     exact = march(whole.model, values, duration, whole.steps, stations(whole), weights(whole.scheme))
     true = differences(whole.model, found.outcome, outcome(whole.model, exact))
     held = np.isfinite([result.tolerance for result in results_of(whole.model)])

@@ -17,6 +17,7 @@ def turned_to(*values: Any, **more: Any) -> Study:
 
 HUNG = {"arm": {"joints": [TURN]}, "tool": {"on": "arm"}}
 SPIN = {"kind": "revolute", "axis": [0, 1, 0], "motion": {"kind": "spin-up", "rate": 0.1, "time": 2.0}}
+SLIDE = {"kind": "prismatic", "axis": [0, 1, 0], "motion": {"kind": "waypoints", "times": [0, 1], "values": [0, 0.1]}}
 LATER = TURN | {"motion": {"kind": "waypoints", "times": [0, 1.5], "values": [0, -0.1]}}
 ASIDE = {"body": "arm", "at": 10.0, "quantity": "position_error", "direction": "y"}
 MOMENT = {"quantity": "bending_moment"}
@@ -55,6 +56,10 @@ SAID = {
     "sensor low reads 0: its body has no displacement as it does not bend": with_tool(
         frame=HUNG, sensor={"low": {"body": "tool", "at": 0.5}}
     ),
+    "frame.arm.joints.0 turns arm across the plane in which it bends: lateral_modes of frame.arm, with its": driven(
+        joints=[TURN | {"axis": [0, 0, 1]}]
+    ),
+    "frame.arm.joints.1 pushes arm across the plane in which it bends": driven(joints=[TURN, SLIDE]),
     "sensor side reads 0: nothing that carries it moves or bends along y over the ground: lateral_modes of frame.arm": (
         driven(sensor={"side": ASIDE})
     ),
@@ -86,6 +91,6 @@ def test_nothing_is_remarked_of_ordinary_studies() -> None:
     assert KIND.remarks(driven(sensor={"side": ASIDE}, joints=[about_z, TURN])) == ()
     assert KIND.remarks(heavy(initial="equilibrium")) == ()
     aside = {"joints": [TURN | {"axis": [0, 0, 1]}], "turned": ["90 deg", 0, 0]}
-    assert KIND.remarks(heavy(frame={"arm": aside})) == ()
+    assert not any("swinging" in said for said in KIND.remarks(heavy(frame={"arm": aside})))
     assert KIND.remarks(heavy(frame={"arm": {"joints": [TURN], "turned": [0, "90 deg", 0]}})) == ()  # upright
-    assert len(REMARKS) == 9
+    assert len(REMARKS) == 10
