@@ -69,9 +69,11 @@ class AskedOfRest(Spec):
 class AskedOfPassages(Limits, AskedOfRest):
     """The table [question] of a passage. amplification: dynamic over static, of which is told at which speeds it is
     exceeded; the limits: of absolute values, of which the same is told for every sensor of that quantity; dynamic_part:
-    of sensors that read no more than that."""
+    of sensors that read no more than that; least_contact: part of its weight, of which is told where a contact force
+    falls below it."""
 
     amplification: Annotated[Dimensionless, Field(gt=0)] = 1.1
+    least_contact: Annotated[Dimensionless, Field(gt=0, lt=1)] | None = None
     dynamic_part: Limits = Limits()
 
     def of(self, sensor: Sensor) -> float | None:
@@ -102,6 +104,16 @@ def check_limits(study: Study, asked: AskedOfPassages) -> None:
                 part = ' and part = "dynamic"' * key.startswith("dynamic")
                 remedy = f'a sensor with quantity = "{name}"{part}, or no such limit'
                 raise study.source.fault(f"question.{key}{name}", what, remedy=remedy)
+
+
+def check_least_contact(study: Study, asked: AskedOfPassages) -> None:
+    """Refuse a limit of contact forces where none reacts or has a weight. Raises BadInput."""
+    if asked.least_contact is None:
+        return
+    if not (study.gravity and any(one.inertial for one in study.carriage.values())):
+        what = "a limit of contact forces, where no carriage has a weight that it presses with"
+        remedy = 'a carriage of the kind "mass", "oscillator" or "body", and gravity'
+        raise study.source.fault("question.least_contact", what, remedy=remedy)
 
 
 def told_limit(
@@ -179,7 +191,11 @@ def of_every_quantity(results: Results, most: int) -> list[str]:
 def where_beyond(results: Results, values: Array, threshold: float, axis: Axis | None) -> str:
     """In which part of the sweep values (in its shape) exceed a threshold: along one swept number, for each value of
     another where these are few; without one in how many variants."""
-    beyond = np.nan_to_num(np.where(results.with_values, values, np.nan)) > threshold
+    return where(results, np.nan_to_num(np.where(results.with_values, values, np.nan)) > threshold, axis)
+
+
+def where(results: Results, beyond: Mask, axis: Axis | None) -> str:
+    """In which part of the sweep variants are beyond something, as of `where_beyond`."""
     if not beyond.any() and sum(one.values.size > 1 for one in results.axes) > 1:
         return "nowhere in the sweep"
     if axis is not None and VARIANT in results.dims and _has_samples(results, axis):

@@ -9,9 +9,9 @@ import numpy as np
 from results_schema.arrays import Array, Mask
 from studies.findings.absolute_errors import absolute_errors, weight
 from studies.findings.amplification import sizes
-from studies.findings.beyond import MOST_TOLD
+from studies.findings.beyond import MOST_TOLD, where
 from studies.findings.effects import unchanged
-from studies.results.axes import VARIANT, Axis
+from studies.results.axes import PACES, VARIANT, Axis
 from studies.results.findings_common import in_words, uncertainty
 from studies.results.formatting import ALIKE, ROUNDING, counted, listed, number, quantity
 from studies.results.places import Index, chosen, extreme
@@ -19,6 +19,8 @@ from studies.results.results import Results
 
 MOST_GROUPS = 5
 BEYOND = "The equations assume contact: beyond, they say no more."
+#: Sensors read contact forces to the very end; smallest ones are of that span where they converge with the modes.
+ASIDE = ", the last 2 % before a held end aside"
 
 
 def told_contacts(results: Results) -> tuple[list[str], list[str]]:
@@ -26,6 +28,31 @@ def told_contacts(results: Results) -> tuple[list[str], list[str]]:
     opened = _opened(results)
     kept = {name: force for name, force in _contact_forces(results) if name not in opened}
     return [_lifted(results, opened)] if opened else [], _kept(results, kept)
+
+
+def told_low_contacts(results: Results, least: float | None) -> list[str]:
+    """Where the contact force of the carriage that presses least falls below a part of its weight, and which others'
+    do; nothing where no part is given."""
+    parts = {name: _part_of_weight(results, name) for name, _ in _contact_forces(results)}
+    if least is None or not parts:
+        return []
+    below = {name: np.nan_to_num(part, nan=np.inf) < least for name, part in parts.items()}
+    lowest = min(parts, key=lambda name: float(np.nanmin(parts[name])))
+    place = extreme(-parts[lowest])
+    assert place is not None
+    others = [name for name in parts if name != lowest and below[name].any()]
+    also = f" So {'do those' if len(others) > 1 else 'does that'} of {listed(others[:MOST_TOLD])}" if others else ""
+    also += f" and {len(others) - MOST_TOLD} more." if len(others) > MOST_TOLD else "." * bool(also)
+    said = f"falls below {number(least)} of its weight {where(results, below[lowest], results.axis(*PACES))}"
+    smallest = f"at its smallest it is {number(float(parts[lowest][place]))} of it{in_words(results, place)}"
+    return [f"The contact force of {lowest} {said}; {smallest}{ASIDE if _is_read(results) else ''}.{also}"]
+
+
+def _part_of_weight(results: Results, carriage: str) -> Array:
+    """Smallest contact forces over the weight, in the sweep's shape; NaN where there is none."""
+    force, own = results.everywhere(results.dataset[f"{carriage}_contact_force_min"]), weight(results, carriage)
+    weights = results.everywhere(own)
+    return np.asarray(np.divide(force, weights, out=np.full(results.shape, np.nan), where=weights > 0.0))
 
 
 def told_uplift(results: Results, sensor: str, of: Sequence[str]) -> str:
@@ -123,15 +150,19 @@ def _kept(results: Results, forces: dict[str, Array]) -> list[str]:
     assert place is not None
     force = f"{quantity(least[lowest], 'N')}{uncertainty(results, f'{lowest}_contact_force_min', place)}"
     smallest = f"the smallest contact force{of} is {force}{in_words(results, place)}"
-    return [*found, f"{who} {keeps} contact everywhere; {smallest}{_nearest_to_lifting(results, lowest, place)}."]
+    all_over = f"everywhere{ASIDE if _is_read(results) else ''}"
+    return [*found, f"{who} {keeps} contact {all_over}; {smallest}{_nearest_to_lifting(results, lowest, place)}."]
+
+
+def _is_read(results: Results) -> bool:
+    """Whether a sensor reads a contact force."""
+    return any(sensor.quantity == "contact_force" for sensor in results.study.sensor.values())
 
 
 def _nearest_to_lifting(results: Results, carriage: str, place: Index) -> str:
     """Where a contact force is the smallest part of a weight that differs over the sweep; "" where that is the place
     where it is smallest."""
-    forces = results.everywhere(results.dataset[f"{carriage}_contact_force_min"])
-    weights = results.everywhere(weight(results, carriage))
-    part = np.divide(forces, weights, out=np.full(results.shape, np.nan), where=weights > 0.0)
+    part = _part_of_weight(results, carriage)
     least = extreme(-part)
     if least is None or float(part[least]) >= (1.0 - ALIKE) * float(part[place]):
         return ""

@@ -25,13 +25,14 @@ from studies.findings.beyond import (
     LIMIT,
     MOST_TOLD,
     AskedOfPassages,
+    check_least_contact,
     check_limits,
     largest_size,
     ranked,
     told_limit,
     where_beyond,
 )
-from studies.findings.contacts import told_contacts, told_uplift
+from studies.findings.contacts import told_contacts, told_low_contacts, told_uplift
 from studies.findings.effects import (
     by_effect,
     hardly_changed,
@@ -84,6 +85,7 @@ class Passage(Kind):
         first_carriage(study)
         check_sensors(study)
         check_limits(study, question_of(study, AskedOfPassages))
+        check_least_contact(study, question_of(study, AskedOfPassages))
         check_residual(study, question_of(study, AskedOfPassages))
 
     def summarise(self, dataset: xr.Dataset, study: Study) -> xr.Dataset:
@@ -105,8 +107,9 @@ class Passage(Kind):
             said[len(envelopes)] += _limited_besides(results, first) + _amplified_besides(results, first)
         said[0] += _effects(results, envelopes, sensors) + _in_step(results, envelopes, sensors)
         lifted, kept = told_contacts(results)
-        residual = residuals(results, question_of(results.study, AskedOfPassages))
-        return [*residual[:1], *said[:1], *lifted, *residual[1:], *said[1:], *kept, *told_statuses(results)]
+        asked = question_of(results.study, AskedOfPassages)
+        residual, low = residuals(results, asked), told_low_contacts(results, asked.least_contact)
+        return [*residual[:1], *said[:1], *low, *lifted, *residual[1:], *said[1:], *kept, *told_statuses(results)]
 
     def named(self, results: Results) -> list[Index]:
         """For every sensor of the answer the variants with the largest value and the largest amplification, and those

@@ -44,6 +44,7 @@ def test_forward_is_compared_with_backward() -> None:
     [
         ([1.0, 2.0, 3.0], 0.0, " Forward and backward it is the same."),
         ([1.0, 2.1, 3.0], 0.1, " Forward and backward it is the same within its estimated error."),
+        ([1.0, 2.1, 3.0], 0.03, " Forward and backward it is the same within its estimated error."),
         ([1.0, 2.1, 3.2], 0.0, " Forward and backward it differs most at mass 100 kg: 3 m forward, 3.2 m backward."),
         ([1.0, 2.0001, 3.0], 0.0, " Forward and backward it hardly differs: by at most 0.005 %, at mass 50 kg."),
         ([1.0, np.nan, 2.9], 0.0, " Forward and backward it differs most at mass 100 kg: 3 m forward, 2.9 m backward."),

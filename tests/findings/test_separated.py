@@ -8,6 +8,7 @@ import xarray as xr
 
 import studies
 from engine.scene.study import Study
+from results_schema.errors import BadInput
 from results_schema.status import Status
 from studies.kinds.double_peak import KIND as DOUBLE_PEAK
 from studies.moving.findings import others, sliding
@@ -46,6 +47,37 @@ def test_a_limit_that_is_exceeded_where_the_contact_opens_alone_is_told() -> Non
     (said,) = (text for text in answers.answer(dataset) if text.startswith("midspan: "))
     assert said.startswith("midspan: while the contact holds, the largest displacement at 5 m of bed is 100 mm")
     assert "exceeds 500 mm nowhere from 1 to 8 m/s; it does in 1 of 1 variant whose contact opens." in said
+
+
+HEAVY = 'mass = { of = "carriage.table.mass", values = [1, 20] }'
+
+
+def test_where_a_contact_force_falls_below_a_part_of_the_weight() -> None:
+    """Of the carriage that presses least, wherever the contact opens, too; of a light one nowhere."""
+    fast = f"{scenes.pace('passage', 1.0, 12.0)}\n{HEAVY}"
+    dataset = scenes.run("passage", fast, extra="[question]\nleast_contact = 0.9")
+    speeds, weights = np.linspace(1.0, 12.0, 4), 9.81 * np.array([1.0, 20.0])
+    parts = np.array([[0.99, 0.99], [0.95, 0.899], [0.99, 0.5], [0.99, -0.2]])
+    dataset["table_contact_force_min"].values[:] = parts * weights
+    dataset["status"].values[-1, -1] = Status.SEPARATED
+    (said,) = (text for text in answers.answer(dataset) if text.startswith("The contact force of table"))
+    where = f"from {speeds[1]:.3g} m/s to the end of the sweep, 12 m/s (mass 20 kg)"
+    assert "falls below 0.9 of its weight nowhere from 1 to 12 m/s (mass 1 kg); " in said and where in said
+    assert said.endswith("; at its smallest it is -0.2 of it at pace 12 m/s, mass 20 kg.")
+    assert not any("of its weight" in text for text in answers.answer(scenes.run("passage", fast)))
+
+
+def test_a_least_contact_where_nothing_presses_by_its_weight_is_refused() -> None:
+    with pytest.raises(BadInput, match=r"question\.least_contact: a limit of contact forces.*and gravity"):
+        studies.run(scenes.study("passage", "", extra="[question]\nleast_contact = 0.5").with_values({"gravity": 0.0}))
+
+
+def test_smallest_contact_forces_beside_a_sensor_that_reads_them_say_where_they_are_of() -> None:
+    read = '[sensor.wheel]\ncarriage = "table"\nquantity = "contact_force"\n'
+    for extra, aside in (("", False), (read, True)):
+        said = " ".join(answers.answer(scenes.run("passage", HEAVY, extra=extra)))
+        assert "table keeps its contact everywhere" in said
+        assert ("everywhere, the last 2 % before a held end aside;" in said) == aside
 
 
 def test_a_map_of_amplifications_says_of_which_cells_its_title_is() -> None:
