@@ -28,9 +28,9 @@ def refuse_scene(study: Study) -> None:
     if study.initial == "equilibrium":
         _check_rests(study)
     for name, body in study.body.items():
-        if not body.own_weight and study.gravity > 0.0:
+        if not body.own_weight and "own_weight" in body.model_fields_set and study.gravity > 0.0:
             what = "bodies in frames that move carry their own weight"
-            raise fault(f"body.{name}.own_weight", what, expected="own_weight = true")
+            raise fault(f"body.{name}.own_weight", what, expected="true, or the key left out")
     for name, carriage in study.carriage.items():
         _check_carriage(study, name, carriage)
     for name, sensor in study.sensor.items():

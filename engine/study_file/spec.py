@@ -107,7 +107,7 @@ class KindOf:
             word = str(kind).lower().replace("_", "-").replace(" ", "-")
             meant = f'did you mean "{_MEANT[word]}"?' if _MEANT.get(word) in self.table else ""
             remedy = meant or nearest(kind, list(self.table)) or _OTHER_KINDS.get(word, "")
-            what = f"unknown {self.noun} kind"
+            what = f"unknown kind of {self.noun}"
             problem = fault(what, expected=f"one of {known}", received=shortened(kind), remedy=remedy)
         detail = InitErrorDetails(type=problem, loc=("kind",), input=kind)
         raise ValidationError.from_exception_data(self.noun, [detail])
@@ -182,6 +182,8 @@ _MEANT = by_other_names(
     ("point-to-point", "trapezoidal trapezoid s-curve scurve ptp"),
     ("timed-move", "move-in-time move-time timed"),
     ("cruise", "constant-speed constant linear uniform"),
+    ("rigid", "mass rigid-body lump payload"),  # of a body; "mass" is a carriage
+    ("waypoints", "timed-move cycloidal rest-to-rest"),  # of a joint; a carriage has timed-move itself
 )
 
 # what others call a number -> its key; of several the first that is there

@@ -50,6 +50,7 @@ class MovingFrames(PiecedKind):
     names_limits = True
     sweeps = True
     audit_seconds = AUDIT_SECONDS
+    instead_of_residual = 'quantity = "position_error" on a sensor, of which SENSOR_after_stop_max is told'
     moves_frames = True
     drawn_by = "studies.pictures.moving_frames"
 

@@ -128,6 +128,7 @@ class PiecedKind(Kind, ABC):
 
     sweeps = False
     audit_seconds = 0.0
+    instead_of_residual = ""  # what such a study tells of the time after a stop
 
     def check_tables(self, study: Study) -> None:
         if study.sweep.axes and not self.sweeps:
@@ -143,7 +144,8 @@ class PiecedKind(Kind, ABC):
             raise study.source.fault("output.keep", what, expected='"all"', received=study.output.keep)
         if study.output.residual:
             what = f"studies of the kind {self.name} tell no residual vibration"
-            raise study.source.fault("output.residual", what, expected="false", received="true")
+            source, remedy = study.source, self.instead_of_residual
+            raise source.fault("output.residual", what, expected="false", received="true", remedy=remedy)
         if study.envelope:
             what, expected = f"studies of the kind {self.name} have no envelopes", "no table [envelope]"
             raise study.source.fault("envelope", what, expected=expected, received=", ".join(study.envelope))

@@ -124,7 +124,7 @@ MISTAKES = {
     "damping in per cent": (SMALL.replace("ratio = 0.02", "ratio = 2"), 2, ["damping_ratio", '0.02 or "2 %"']),
     "damping of 70 %": (SMALL.replace("ratio = 0.02", "ratio = 0.7"), 0, ["damping_ratio = 0.7:", '"0.7 %"']),
     "a kind that no package brings": (
-        SMALL.replace('kind = "cruise"', 'kind = "ramp"'), 2, ["unknown motion kind", "is the package installed"],
+        SMALL.replace('kind = "cruise"', 'kind = "ramp"'), 2, ["unknown kind of motion", "is the package installed"],
     ),
     "a decimal comma in quotes": (SMALL.replace("length = 1.0", 'length = "2,5 m"'), 2, ["decimal comma", '"2.5 m"']),
     "a sensor under a train": (

@@ -146,7 +146,7 @@ def test_numbers_and_units() -> None:
         ("damping_ratio = 0.02", "damping_ratio = 1.0", ["body.bed.damping_ratio", "< 1"]),
         ("damping_ratio = 0.02", "damping_ratio = [0.1, -0.1]", ["body.bed.damping_ratio.1", ">= 0"]),
         ("damping_ratio = 0.02", "damping_ratio = { raleigh = [1, 2] }", ["raleigh", '"rayleigh"']),
-        ('kind = "beam"', 'kind = "bem"', ["body.bed.kind", "unknown body kind", '"beam"']),
+        ('kind = "beam"', 'kind = "bem"', ["body.bed.kind", "unknown kind of body", '"beam"']),
         ('kind = "beam"', 'kind = "nastran"', ["body.bed", "unknown key", "matrices, nodes"]),
         ('kind = "beam"', 'kind = "matrices"', ["body.bed", "unknown key", "stiffness, mass"]),
         ('kind = "mass"', 'kind = "body"', ["carriage.table", "unknown key", "contacts"]),
