@@ -156,7 +156,8 @@ def _kept(results: Results, forces: dict[str, Array]) -> list[str]:
 
 def _is_read(results: Results) -> bool:
     """Whether a sensor reads a contact force."""
-    return any(sensor.quantity == "contact_force" for sensor in results.study.sensor.values())
+    read = [sensor.reads for sensor in results.study.sensor.values()]
+    return any(one.of_contact and not one.of_suspension for one in read)
 
 
 def _nearest_to_lifting(results: Results, carriage: str, place: Index) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Annotated
 
 import numpy as np
@@ -17,7 +17,7 @@ from studies.findings.beyond import Limits
 from studies.moving import findings
 from studies.moving.parts import AUDIT_SECONDS, gather
 from studies.moving.variables import RESULTS
-from studies.protocol.parts import Foreseen, Piece, Work
+from studies.protocol.parts import Foreseen, Piece, TextTable, Work
 from studies.protocol.study import PiecedKind, question_of
 from studies.results.results import Results
 
@@ -63,6 +63,11 @@ class MovingFrames(PiecedKind):
         if study.output.histories not in ("auto", "all", "none"):
             what = "histories of frames that move are kept at some 800 times"
             raise fault("output.histories", what, expected='"auto", "all" variants or "none"')
+
+    def tables(self, study: Study) -> Iterable[TextTable]:
+        from studies.moving.preview import together
+
+        return together(study)
 
     def pieces(self, study: Study) -> Sequence[Piece]:
         from studies.moving.parts import pieces

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +13,7 @@ from results_schema.status import Status, label
 from studies.moving.parts import AUDIT_SECONDS, again, pieces, scenes
 from studies.protocol.parts import Foreseen, Piece, TextTable, Work
 from studies.protocol.stopping import AskedElsewhere
-from studies.results.formatting import counted, listed, scientific, spanned
+from studies.results.formatting import counted, listed, number, scientific, spanned
 from studies.results.places import spread
 
 if TYPE_CHECKING:
@@ -31,6 +31,7 @@ MEASURED = 3  # pieces
 #: first piece alone.
 ENOUGH = 1.0
 UNFINISHED = 2.0  # times the seconds in which a piece was not done that it takes
+MODES_TOGETHER, SHOWN = 8, 6  # of bending, where these are open; lowest frequencies of all together
 HEADINGS = ("variants", "modes of all bodies", "steps", "estimated error", "status")
 
 
@@ -76,11 +77,11 @@ def _computed(everything: Sequence[Piece], threads: int, clock: Clock) -> dict[i
     """Some pieces by their numbers, as far as there is time."""
     begun, found = clock(), dict[int, "xr.Dataset"]()
     work = Work(threads, AskedElsewhere(lambda: clock() > begun + PATIENCE))
-    for number in spread(len(everything), MEASURED):
+    for place in spread(len(everything), MEASURED):
         if found and clock() > begun + ENOUGH:
             break
         try:
-            found[number] = everything[number].compute(work)
+            found[place] = everything[place].compute(work)
         except Halted:
             break
     return found
@@ -115,3 +116,19 @@ def _row(part: xr.Dataset, held: Mask) -> tuple[str, ...]:
     variants = f"{int(part['number'].values[0]):,} to {int(part['number'].values[-1]):,}"
     modes = spanned(part["modes_used"].values.astype(float))
     return variants, modes, spanned(part["steps_used"].values.astype(float)), worst, words
+
+
+def together(study: Study) -> Iterator[TextTable]:
+    """The lowest natural frequencies of all bodies and carriages of a scene together, where these say more than those
+    of each body."""
+    from engine.floating.frequencies import natural_omega
+    from engine.floating.model import build
+
+    if len(study.body) + len(study.carriage) < 2:
+        return
+    omega = natural_omega(build(study.without_sweep(), MODES_TOGETHER))
+    if omega is not None:
+        frequencies = [number(float(one) / (2.0 * np.pi)) for one in omega[:SHOWN]]
+        more = " ..." if omega.size > SHOWN else ""
+        title = "All together at time 0, driven joints held, without gravity"
+        yield TextTable(title, ("frequencies (Hz)",), [(", ".join(frequencies) + more,)])

@@ -1,0 +1,130 @@
+"""Natural frequencies of everything together as it stands at time 0: joints that are driven hold, the others turn and
+slide on their springs; without gravity and turning, which stiffen or soften little of what is meant to stand.
+
+Particles of all bodies move by small motions q with displacements J q, so that M = sum of m J' J, and K has the modes'
+own stiffness and that of joints.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from engine.floating.bodies.fields import AXES
+from engine.floating.theory import given_way
+from engine.kernels.floating.layout import PRISMATIC, REVOLUTE
+from engine.scene.frames import GROUND, AxisJoint
+from engine.scene.variants import VariantValues
+from results_schema.arrays import Array
+
+if TYPE_CHECKING:
+    from engine.floating.bodies.elastic import ElasticBody
+    from engine.floating.model import FloatingModel
+
+
+class Placed(NamedTuple):
+    """A frame at time 0: attitude (3, 3), columns its axes; place (3,) m; moves, turns (3, N) of its origin by small
+    motions, over the ground."""
+
+    attitude: Array
+    place: Array
+    moves: Array
+    turns: Array
+
+    def at(self, arm: Array, own: Array) -> Array:
+        """(3, N) how a place moves that lies at an arm (3,) m, over the ground, from the origin; own (3, N): in the
+        frame, by what bends."""
+        return np.asarray(self.moves + np.cross(self.turns, arm, axisa=0, axisb=0, axisc=0) + self.attitude @ own)
+
+
+def natural_omega(model: FloatingModel) -> Array | None:
+    """(N,) rad/s, ascending, 0 of what nothing holds, of a scene's own numbers; None where joints turn freely in all
+    directions, springs are between places, or a carriage slides or has a suspension."""
+    joints = [joint for joint in model.joints if joint.coordinate >= 0]
+    if model.links or model.places or model.springs or any(j.kind not in (REVOLUTE, PRISMATIC) for j in joints):
+        return None
+    frames, N = dict[str, Placed](), model.size
+    stiffness, mass = np.zeros(N), np.zeros((N, N))
+    for joint in joints:
+        assert isinstance(joint.spec, AxisJoint)
+        stiffness[joint.coordinate] = joint.spec.stiffness
+    for name, body in model.bodies.items():
+        frames[name] = frame = _placed(model, name, frames)
+        own = _own(model, name, np.asarray(np.moveaxis(body.shapes, 1, 0)))  # (3, G, N)
+        stiffness[_modes(model, name)] = body.omega**2
+        for place, weight, bent in zip(body.places, body.weights, np.moveaxis(own, 1, 0), strict=True):
+            moved = frame.at(frame.attitude @ place, bent)
+            mass += weight * moved.T @ moved
+        inertia = frame.attitude @ np.diag(body.own_inertia) @ frame.attitude.T
+        mass += frame.turns.T @ inertia @ frame.turns
+    mass += _carried(model, frames)
+    omega_squared = np.linalg.eigvalsh(_over(mass, stiffness))
+    return np.asarray(np.sqrt(np.maximum(np.sort(omega_squared), 0.0)))
+
+
+def _over(mass: Array, stiffness: Array) -> Array:
+    """(N, N) K between coordinates in which the mass matrix is one."""
+    lower = np.linalg.inv(np.linalg.cholesky(mass))
+    return np.asarray(lower @ (stiffness[:, None] * lower.T))
+
+
+def _modes(model: FloatingModel, name: str) -> slice:
+    """The coordinates of a body's modes."""
+    first = model.first[name]
+    return slice(first, first + model.bodies[name].omega.size)
+
+
+def _own(model: FloatingModel, name: str, shapes: Array) -> Array:
+    """(..., N) of all coordinates from those of a body's own modes."""
+    found = np.zeros((*shapes.shape[:-1], model.size))
+    found[..., _modes(model, name)] = shapes
+    return found
+
+
+def _bent(model: FloatingModel, name: str, x: float) -> tuple[Array, Array]:
+    """(3, N) twice: how a place of a body's track moves and turns in its frame, by its modes."""
+    body: ElasticBody = model.bodies[name]
+    fields = _own(model, name, body.fields(np.array([x]), (0,))[0, 0])
+    return fields[: AXES // 2], fields[AXES // 2 :]
+
+
+def _placed(model: FloatingModel, name: str, frames: dict[str, Placed]) -> Placed:
+    """The frame of a body from that of what holds it, through its joints."""
+    from scipy.spatial.transform import Rotation
+
+    own, N = model.frame(name), model.size
+    if own.on == GROUND:
+        frame = Placed(np.eye(3), np.array(own.position), np.zeros((3, N)), np.zeros((3, N)))
+    else:
+        holder = frames[own.on]
+        x = model.bodies[own.on].length if own.at is None else own.at
+        arm, (bent, turned) = holder.attitude @ np.array([x, 0.0, 0.0]), _bent(model, own.on, x)
+        moves, turns = holder.at(arm, bent), holder.turns + holder.attitude @ turned
+        frame = Placed(holder.attitude, holder.place + arm, moves, turns)
+    frame = frame._replace(attitude=frame.attitude @ Rotation.from_rotvec(own.turned).as_matrix())
+    for joint in (joint for joint in model.joints if joint.body == name):
+        turn, shift = joint.spec.at_start
+        arm = frame.attitude @ shift
+        frame = frame._replace(place=frame.place + arm, moves=frame.at(arm, np.zeros((3, N))))
+        if joint.coordinate >= 0:
+            way = frame.turns if joint.kind == REVOLUTE else frame.moves
+            way[:, joint.coordinate] += frame.attitude @ np.array(joint.axis)
+        frame = frame._replace(attitude=frame.attitude @ Rotation.from_rotvec(turn).as_matrix())
+    return frame
+
+
+def _carried(model: FloatingModel, frames: dict[str, Placed]) -> Array:
+    """(N, N) the masses of carriages where their motions begin."""
+    found, values = np.zeros((model.size, model.size)), VariantValues(model.study, {}, 1)
+    for name, carriage in model.study.carriage.items():
+        at = float(given_way(model, values, np.array([SOON]), name)[0][0])
+        frame, (bent, _) = frames[carriage.on], _bent(model, carriage.on, at)
+        moved = frame.at(frame.attitude @ np.array([at, 0.0, 0.0]), bent)
+        found += sum(float(model.study.value(f"carriage.{name}.{key}") or 0.0) for key in carriage.masses) * (
+            moved.T @ moved
+        )
+    return found
+
+
+SOON = 1e-9  # s after the start
