@@ -58,6 +58,11 @@ class Portal(PiecedKind):
 
         return again(study, question_of(study, Question), variants, work)
 
+    def remarks(self, study: Study) -> Sequence[str]:
+        from studies.robots.remarks import remarks
+
+        return remarks(study)
+
     def tables(self, study: Study) -> Iterable[TextTable]:
         from studies.robots.preview import tables
 

@@ -1,0 +1,43 @@
+"""What a user should know before believing a study of robots on rails: what is allowed and yet often a mistake."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from studies.results.formatting import quantity
+
+if TYPE_CHECKING:
+    from engine.scene.study import Study
+
+#: Of the torque that turns what hangs on a hinge back to where it rests: a softer one leaves it hanging as on a rope.
+SOFT = 0.1
+
+
+def remarks(study: Study) -> tuple[str, ...]:
+    """One sentence per remark, each once; none for an ordinary study."""
+    from engine.batch.plausibility import doubtful, half_united
+    from engine.scene.sweep import expand
+
+    found = [*doubtful(study, expand(study)), *half_united(study), *_pushed_along(study)]
+    return tuple(dict.fromkeys(found))
+
+
+def _pushed_along(study: Study) -> Iterator[str]:
+    """Hinges that hang as on a rope, whose drives are told the forces of the plan."""
+    for name, robot in study.robot.items():
+        if robot.feedforward != "plan":
+            continue
+        links, tool = study.arm[robot.arm].links, np.linalg.norm(study.arm[robot.arm].tool)
+        for number, link in enumerate(links):
+            last = number == len(links) - 1
+            moment = link.mass * np.linalg.norm(link.centre) + robot.payload * robot.payload_scale * tool * last
+            torque = float(study.gravity * moment)
+            if not link.slides and link.stiffness and link.stiffness < SOFT * torque:
+                yield (
+                    f"link {number} of {robot.arm} is held by {quantity(link.stiffness, 'N m/rad')}, and hangs with up "
+                    f'to {quantity(torque, "N m")}: with robot.{name}.feedforward = "plan" its drive pushes it along '
+                    'all the same, so that it hardly swings; is "gravity" meant?'
+                )
