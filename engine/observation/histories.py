@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 CYCLE_STATIONS = 200  # of a kept history over the last cycle
 WHOLE_STATIONS = 401  # of a kept history over a whole run
-REST_STATIONS = 201  # more over its rest, where it is told how far sensors swing on
+REST_STATIONS = 1201  # more over its rest, where it is told how far sensors swing on: 150 periods of some 8 each
 
 
 def counts_shown(timeline: Timeline, window: Window, wanted: Literal["auto", "none", "all"] | Every) -> Counts:
