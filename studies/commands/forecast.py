@@ -60,11 +60,12 @@ class Time(NamedTuple):
 
 class Looked(NamedTuple):
     """What some variants converged with; seconds that a few of a scene take, in the mean of all that are at work at the
-    same time; start: seconds until these are at work."""
+    same time; start: seconds until these are at work; together: how many these few are, in the mean."""
 
     parts: list[chosen.Part]
     seconds: float
-    start: float = 0.0
+    start: float
+    together: float
 
 
 @one_thread()
@@ -112,9 +113,10 @@ def _converge(plan: Plan, here: Place, until: Time) -> Looked:
         try:
             parts += [part for found in share(plan, some) for part in found]
         except Halted:
-            return Looked(parts, UNFINISHED * (until.clock() - started) / len(some), start)
+            took = UNFINISHED * (until.clock() - started) / len(some)
+            return Looked(parts, took, start, len(parts) / max(done, 1))
         done += len(some)
-    return Looked(parts, (until.clock() - started) / done, start)
+    return Looked(parts, (until.clock() - started) / done, start, len(parts) / done)
 
 
 def _samples(plan: Plan, count: int) -> list[Job[list[chosen.Part]]]:
@@ -138,8 +140,9 @@ def _converged(plan: Plan, lanes: Counts, halted: Callable[[], bool], scene: int
 def _of_convergence(plan: Plan, looked: Looked, threads: int) -> Forecast:
     """A study whose variants all converge by themselves, each chunk with tables of its own."""
     chunks = sum(1 for _ in plan.chunks(None, None))
-    at_once, in_turns = looked.seconds * threads, -(-chunks // threads)
-    seconds = looked.start + at_once * in_turns + plan.seconds / min(threads, chunks)
+    part = looked.together * chunks / plan.size  # of a chunk that variants were which were looked at together
+    at_once, in_turns, more = looked.seconds * threads / max(part, 1.0), -(-chunks // threads), max(0.0, 1.0 - part)
+    seconds = looked.start + at_once * in_turns + more * plan.seconds / min(threads, chunks)
     if not looked.parts:
         less = f"{PATIENCE:.0f} seconds were not enough for a variant to converge: this may take longer"
         return Forecast(plan, "", (), seconds, less)

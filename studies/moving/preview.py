@@ -11,7 +11,7 @@ from engine.kernels.compiling import clock_without_compiling
 from engine.march.stepper import Halted
 from results_schema.status import Status, label
 from studies.moving.parts import AUDIT_SECONDS, again, pieces, scenes
-from studies.protocol.parts import Foreseen, Piece, TextTable, Work
+from studies.protocol.parts import Foreseen, Piece, TextTable, Work, unlabelled
 from studies.protocol.stopping import AskedElsewhere
 from studies.results.formatting import counted, listed, number, scientific, spanned
 from studies.results.places import spread
@@ -62,7 +62,7 @@ def foreseen(
 
 
 def _compile(scene: Scene) -> None:
-    """A march of two steps, so that what is measured begins with kernels."""
+    """A march of two steps, stored as a piece is, so that what is measured begins with kernels and libraries."""
     from engine.floating.converge import levels, weights
     from engine.floating.march import march
     from engine.floating.model_choice import FIRST_MODES
@@ -70,7 +70,8 @@ def _compile(scene: Scene) -> None:
 
     level = next(iter(levels(scene.study, 1.0, FIRST_MODES)))
     values = VariantValues(scene.study, {}, 1)
-    march(level.model, values, np.full(1, 2.0 / level.steps), 2, np.array([0, 2]), weights(level.scheme))
+    found = march(level.model, values, np.full(1, 2.0 / level.steps), 2, np.array([0, 2]), weights(level.scheme))
+    unlabelled({"history": found.history})
 
 
 def _computed(everything: Sequence[Piece], threads: int, clock: Clock) -> dict[int, xr.Dataset]:
