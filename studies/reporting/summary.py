@@ -107,9 +107,11 @@ class Range:
 
     @property
     def is_loose(self) -> bool:
-        """Whether its end of larger magnitude may be off by much of itself."""
-        known = self.extreme.error > NOISE * self.beside
-        return known and bool(told_error(self.extreme.error, self.extreme.value, self.units))
+        """Whether its end of larger magnitude may be off by much of itself; the smallest over time of what is much
+        larger at other times, as of a distance, by much of that, but for contact forces, which tell of lifting off."""
+        known, least = self.extreme.error > NOISE * self.beside, self.name.endswith("_min")
+        size = self.beside if least and not self.name.endswith("contact_force_min") else 0.0
+        return known and bool(told_error(self.extreme.error, max(abs(self.extreme.value), size), self.units))
 
     def value(self, value: float, digits: int = 3) -> str:
         """One of its values with the unit."""

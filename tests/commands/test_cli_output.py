@@ -169,3 +169,12 @@ def test_loose_residual_vibrations_are_told_with_the_key_that_tells_them_closer(
     (said,) = screens.told_loosely([Range(name, "", "m", *ends)], {status: 1})
     assert "more than a tenth of the value: " in said and "2 µm ± 500 nm" in said
     assert ("smaller tolerance (sensor.tool.tolerance)" in said) == closer
+
+
+@pytest.mark.parametrize(
+    ("name", "loose"), [("stray_min", False), ("stray_max", True), ("car_contact_force_min", True)]
+)
+def test_the_smallest_of_what_is_far_larger_at_other_times_is_not_told_as_loose(name: str, loose: bool) -> None:
+    """A distance that comes near zero is none the less told well enough; a contact force may well lift off there."""
+    ends = [Extreme(value, {}, {"mass": "1 kg"}, error=9e-6) for value in (1e-7, 2e-6)]
+    assert bool(screens.told_loosely([Range(name, "", "m", *ends, beside=2e-2)], {Status.OK: 1})) == loose
