@@ -128,7 +128,11 @@ def _until(results: Results, sensors: Sequence[str]) -> str:
     shortest, names = _shortest(results, sensors), listed(sensors)
     if shortest.startswith(NEVER):
         return f"{names}: {shortest}"
-    return f"Until {f'all of {names} have' if len(sensors) > 1 else f'{names} has'} settled, {shortest}"
+    lost = int((np.isnan(Times.until_all(results, sensors).values) & results.with_values).sum())
+    of = counted(int(results.with_values.sum()), "variant")
+    rest = f"; {lost:,} of {of} {'do' if lost > 1 else 'does'} not settle"
+    until = f"Until {f'all of {names} have' if len(sensors) > 1 else f'{names} has'} settled, "
+    return f"{until}{shortest}{rest if lost else ''}"
 
 
 def most_ringing(results: Results) -> list[Index]:
