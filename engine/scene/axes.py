@@ -133,7 +133,7 @@ def check_targets(study: Study, name: str, axis: SweepAxis) -> None:
             remedy = nearest(longer[0], longer) if longer else nearest(path, known)
             if several := fnmatch.filter(known, path) if "*" in path else []:
                 remedy = f"name each of them: of = {json.dumps(several[:3])}{' and so on' * (len(several) > 3)}"
-            remedy = _of_list(study, path) or remedy
+            remedy = _of_list(study, path) or remedy or _without_its_table(study, path)
             what = "no such number"
             raise study.source.fault(
                 here, what, expected="the key of a number", received=shortened(path), remedy=remedy
@@ -149,6 +149,13 @@ def check_targets(study: Study, name: str, axis: SweepAxis) -> None:
                 received=shortened(path),
                 remedy="a study file for each",
             )
+
+
+def _without_its_table(study: Study, path: str) -> str:
+    """That the table of a key is not there, such as that of a body's frame; "" where it is, or could not be."""
+    table, name, *rest = *path.split("."), ""
+    there = getattr(study, table, None) if any(rest) else None
+    return f"is the table [{table}.{name}] missing?" if isinstance(there, dict) and name not in there else ""
 
 
 def _of_list(study: Study, path: str) -> str:

@@ -164,7 +164,10 @@ def ascending(values: tuple[Any, ...]) -> tuple[Any, ...]:
     return values
 
 
-ROPE = 'a hanging mass that goes up and down is kind = "oscillator"; one that swings on a rope is not built'
+ROPE = (
+    'a hanging mass that goes up and down is kind = "oscillator"; one that swings on a rope is a link of a robot '
+    '(kind = "portal" in docs/study-file.md)'
+)
 SPRUNG = 'a mass on a spring over its wheel is kind = "oscillator"; one with several axles is kind = "body"'
 # kinds that others look for -> what there is of them
 _OTHER_KINDS = {

@@ -268,7 +268,7 @@ def test_a_swept_key_by_another_word(capsys: pytest.CaptureFixture[str]) -> None
 def test_a_kind_that_is_not_built_says_what_there_is(capsys: pytest.CaptureFixture[str]) -> None:
     Path("study.toml").write_text(SMALL.replace('kind = "mass"', 'kind = "pendulum"'))
     message = told(capsys, 2, "check", "study.toml")
-    assert 'is kind = "oscillator"' in message and "swings on a rope is not built" in message
+    assert 'is kind = "oscillator"' in message and "swings on a rope is a link of a robot" in message
 
 
 @pytest.mark.parametrize(

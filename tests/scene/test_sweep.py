@@ -186,6 +186,8 @@ def test_sobol_is_joint_and_repeatable() -> None:
         (axis("a", "carriage.table.mas", "values = [1]"), ["sweep.a.of", MASS]),
         (axis("a", "body.bed.own_weight", "values = [1]"), ["sweep.a.of", "no such number"]),
         (axis("a", "body.bed", "values = [1]"), ["sweep.a.of", "no such number"]),
+        (axis("a", "nothing", "values = [1]"), ["sweep.a.of", "no such number"]),
+        (axis("a", "frame.arm.turned.1", "values = [1]"), ["sweep.a.of", "no such number", "[frame.arm] missing?"]),
         (axis("a", "schema_version", "values = [1]"), ["sweep.a.of", "not part of the model"]),
         (axis("a", "sweep.a.values.0", "values = [1]"), ["sweep.a.of", "not part of the model"]),
         (f'a = {{ of = ["{MASS}", "gravity"], values = ["1 kg"] }}', ["sweep.a.values.0", "gravity", "a mass"]),
