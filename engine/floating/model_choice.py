@@ -74,7 +74,8 @@ def choose(study: Study, pilots: VariantValues, duration: Array, longest: float)
     longest: of all variants (s)."""
     own = Pilots(study, pilots, duration, longest)
     modes, left_out = _enough_modes(own)
-    fixed = _by_lack_of_stiffening(own, modes, may_stiffen(study, said=False))
+    refused = _by_lack_of_stiffening(own, modes, may_stiffen(study, said=False))
+    fixed = np.where(np.isinf(refused), np.nan, refused)
     stiffened, by_lack = _those_that_stiffen(own, modes)
     study, own, left_out = _stiffened(study, stiffened), own.stiffened(stiffened), left_out + by_lack
     level = next(iter(levels(study, longest, modes)))
@@ -108,17 +109,18 @@ def _stiffened(study: Study, names: Iterable[str]) -> Study:
 
 def _those_that_stiffen(pilots: Pilots, modes: int) -> tuple[tuple[str, ...], Array]:
     """The bodies that are left open, if it changes what is held by more than a small part of the tolerance in any pilot
-    that they stiffen, else none; and by how much it changes results (R,) then."""
+    that they stiffen, or no pilot tells, else none; and by how much it changes results (R,) then."""
     names, results = may_stiffen(pilots.study), results_of(build(pilots.study, modes))
     apart = _by_lack_of_stiffening(pilots, modes, names)
-    if (worst(apart, results, pilots.values) > PART).any():
+    known = ~np.isnan(apart).any(axis=0)
+    if not known.any() or (worst(apart, results, pilots.values)[known] > PART).any():
         return names, np.zeros(len(results))
-    return (), apart.max(axis=1)
+    return (), apart[:, known].max(axis=1)
 
 
 def _by_lack_of_stiffening(pilots: Pilots, modes: int, names: tuple[str, ...]) -> Array:
-    """(R, P) by how much it changes results of pilots that some bodies are stiffened; infinite where it decides whether
-    they have any, and nothing where they have none with stiffening either."""
+    """(R, P) by how much it changes results of pilots that some bodies are stiffened; infinite where they have none
+    without, NaN where they have none with it."""
     model = build(pilots.study, modes)
     found: Array = np.zeros((len(results_of(model)), pilots.values.size))
     if not names:
@@ -132,7 +134,7 @@ def _by_lack_of_stiffening(pilots: Pilots, modes: int, names: tuple[str, ...]) -
         found = differences(model, plain, other)
         if not np.isnan(found).all(axis=1).any():
             break
-    return np.where(np.isnan(found), 0.0, found)
+    return found
 
 
 def _enough_modes(pilots: Pilots) -> tuple[int, Array]:
