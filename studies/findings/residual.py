@@ -96,6 +96,12 @@ def ringing(results: Results, limits: Limits) -> list[str]:
     return [name for name in in_turns(results, limits, size) if not has_whole(results, name)]
 
 
+def asks_of_rest(study: Study, asked: AskedOfRest) -> bool:
+    """Whether the question is about the time after a stop first: by a limit of it, or a band to settle within."""
+    limited = any(asked.residual.limit(name) is not None for name in LIMITED) or asked.settling_time is not None
+    return limited or any(sensor.settling_band is not None for sensor in study.sensor.values())
+
+
 def has_whole(results: Results, name: str) -> bool:
     """Whether a sensor reads the dynamic part of what another one reads, whose settling is told if its own is."""
     known, settles = results.study.sensor, results.study.sensor[name].settling_band is not None

@@ -63,6 +63,16 @@ def test_its_error_stands_beside_it_in_its_own_unit() -> None:
 LIMIT = {"residual": {"displacement": 17e-3}}
 
 
+def test_the_answer_begins_with_the_time_after_the_stop_where_that_is_asked_for() -> None:
+    banded = {"midspan": {"body": "bed", "at": 0.5, "settling_band": 8e-3}}
+    for asked, first in (
+        ({}, "midspan: the largest displacement"),
+        ({"question": {"residual": {"displacement": 17e-3}}}, "midspan: at rest it still swings"),
+        ({"sensor": banded}, "Until midspan has settled"),
+    ):
+        assert answers.answer(studies.run(stops(**asked)))[0].startswith(first)
+
+
 def drawn(found: Any) -> dict[str, Any]:
     """The figures of residual vibrations by name."""
     return {one.name: one for one in studies.figures(found) if one.name in ("residual", "ringing")}
