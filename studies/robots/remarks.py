@@ -11,6 +11,7 @@ from studies.results.formatting import quantity
 
 if TYPE_CHECKING:
     from engine.scene.study import Study
+    from engine.scene.sweep import Cases
 
 #: Of the torque that turns what hangs on a hinge back to where it rests: a softer one leaves it hanging as on a rope.
 SOFT = 0.1
@@ -21,12 +22,14 @@ def remarks(study: Study) -> tuple[str, ...]:
     from engine.batch.plausibility import doubtful, half_united
     from engine.scene.sweep import expand
 
-    found = [*doubtful(study, expand(study)), *half_united(study), *_pushed_along(study)]
+    cases = expand(study)
+    found = [*doubtful(study, cases), *half_united(study), *_pushed_along(study, cases)]
     return tuple(dict.fromkeys(found))
 
 
-def _pushed_along(study: Study) -> Iterator[str]:
-    """Hinges that hang as on a rope, whose drives are told the forces of the plan."""
+def _pushed_along(study: Study, cases: Cases) -> Iterator[str]:
+    """Hinges that hang as on a rope in all variants, whose drives are told the forces of the plan."""
+    swept = {path: float(np.max(axis.values)) for axis in cases.axes for path in axis.paths}
     for name, robot in study.robot.items():
         if robot.feedforward != "plan":
             continue
@@ -35,9 +38,10 @@ def _pushed_along(study: Study) -> Iterator[str]:
             last = number == len(links) - 1
             moment = link.mass * np.linalg.norm(link.centre) + robot.payload * robot.payload_scale * tool * last
             torque = float(study.gravity * moment)
-            if not link.slides and link.stiffness and link.stiffness < SOFT * torque:
+            stiffness = swept.get(f"arm.{robot.arm}.links.{number}.stiffness", link.stiffness or np.inf)
+            if not link.slides and stiffness < SOFT * torque:
                 yield (
-                    f"link {number} of {robot.arm} is held by {quantity(link.stiffness, 'N m/rad')}, and hangs with up "
-                    f'to {quantity(torque, "N m")}: with robot.{name}.feedforward = "plan" its drive pushes it along '
+                    f"link {number} of {robot.arm} is held by {quantity(stiffness, 'N m/rad')}, and hangs with up to "
+                    f'{quantity(torque, "N m")}: with robot.{name}.feedforward = "plan" its drive pushes it along '
                     'all the same, so that it hardly swings; is "gravity" meant?'
                 )
