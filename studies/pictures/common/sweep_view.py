@@ -201,13 +201,11 @@ def draw_curves(axes: Axes, seen: View, curves: Sequence[Curve]) -> None:
         _draw_points(axes, seen, curves[0])
         return
     if seen.y is not None and coincide(curves):
-        # Beside a title it would lie on it in narrow panels.
-        note = f"the same for {seen.y.noun} {seen.y.span}"
-        axes.text(0.99, 0.03, note, transform=axes.transAxes, ha="right", va="bottom", color=look.MUTED, fontsize=8.0)
-        curves = [curves[-1]._replace(label="")]
+        alike = "both alike" if seen.y.sets(DIRECTION) else f"{seen.y.span}, alike"
+        curves = [curves[-1]._replace(label=alike)]
     for curve, colour in zip(curves, shades(len(curves)), strict=True):
         _draw_curve(axes, curve, colour)
-    if seen.y is not None and len(curves) > 1:
+    if seen.y is not None:
         legend_beside(axes, seen.y.noun)
     widen(axes, [curve.y for curve in curves])
 
