@@ -33,8 +33,10 @@ def told_contacts(results: Results) -> tuple[list[str], list[str]]:
 def told_low_contacts(results: Results, least: float | None) -> list[str]:
     """Where the contact force of the carriage that presses least falls below a part of its weight, and which others'
     do; nothing where no part is given."""
+    if least is None:
+        return []
     parts = {name: _part_of_weight(results, name) for name, _ in _contact_forces(results)}
-    if least is None or not parts:
+    if not parts:
         return []
     below = {name: np.nan_to_num(part, nan=np.inf) < least for name, part in parts.items()}
     lowest = min(parts, key=lambda name: float(np.nanmin(parts[name])))
