@@ -32,15 +32,16 @@ class Placed(NamedTuple):
     moves: Array
     turns: Array
 
-    def at(self, arm: Array, own: Array) -> Array:
-        """(3, N) how a place moves that lies at an arm (3,) m, over the ground, from the origin; own (3, N): in the
-        frame, by what bends."""
-        return np.asarray(self.moves + np.cross(self.turns, arm, axisa=0, axisb=0, axisc=0) + self.attitude @ own)
+    def at(self, arms: Array, own: Array) -> Array:
+        """(..., 3, N) how places move that lie at arms (..., 3) m, over the ground, from the origin; own (..., 3, N):
+        in the frame, by what bends."""
+        turned = np.swapaxes(np.cross(self.turns.T, arms[..., None, :]), -1, -2)
+        return np.asarray(self.moves + turned + self.attitude @ own)
 
 
 def natural_omega(model: FloatingModel) -> Array | None:
     """(N,) rad/s, ascending, 0 of what nothing holds, of a scene's own numbers; None where joints turn freely in all
-    directions, springs are between places, or a carriage slides or has a suspension."""
+    directions or about what has no inertia, springs are between places, or a carriage slides or has a suspension."""
     joints = [joint for joint in model.joints if joint.coordinate >= 0]
     if model.links or model.places or model.springs or any(j.kind not in (REVOLUTE, PRISMATIC) for j in joints):
         return None
@@ -51,22 +52,18 @@ def natural_omega(model: FloatingModel) -> Array | None:
         stiffness[joint.coordinate] = joint.spec.stiffness
     for name, body in model.bodies.items():
         frames[name] = frame = _placed(model, name, frames)
-        own = _own(model, name, np.asarray(np.moveaxis(body.shapes, 1, 0)))  # (3, G, N)
         stiffness[_modes(model, name)] = body.omega**2
-        for place, weight, bent in zip(body.places, body.weights, np.moveaxis(own, 1, 0), strict=True):
-            moved = frame.at(frame.attitude @ place, bent)
-            mass += weight * moved.T @ moved
+        moved = frame.at(body.places @ frame.attitude.T, _own(model, name, body.shapes)).reshape(-1, N)
+        mass += (np.repeat(body.weights, 3)[:, None] * moved).T @ moved
         inertia = frame.attitude @ np.diag(body.own_inertia) @ frame.attitude.T
         mass += frame.turns.T @ inertia @ frame.turns
     mass += _carried(model, frames)
-    omega_squared = np.linalg.eigvalsh(_over(mass, stiffness))
-    return np.asarray(np.sqrt(np.maximum(np.sort(omega_squared), 0.0)))
-
-
-def _over(mass: Array, stiffness: Array) -> Array:
-    """(N, N) K between coordinates in which the mass matrix is one."""
-    lower = np.linalg.inv(np.linalg.cholesky(mass))
-    return np.asarray(lower @ (stiffness[:, None] * lower.T))
+    try:
+        unit_mass = np.linalg.inv(np.linalg.cholesky(mass))
+    except np.linalg.LinAlgError:
+        return None
+    omega_squared = np.linalg.eigvalsh(unit_mass @ (stiffness[:, None] * unit_mass.T))
+    return np.asarray(np.sqrt(np.maximum(omega_squared, 0.0)))
 
 
 def _modes(model: FloatingModel, name: str) -> slice:
@@ -118,13 +115,10 @@ def _carried(model: FloatingModel, frames: dict[str, Placed]) -> Array:
     """(N, N) the masses of carriages where their motions begin."""
     found, values = np.zeros((model.size, model.size)), VariantValues(model.study, {}, 1)
     for name, carriage in model.study.carriage.items():
-        at = float(given_way(model, values, np.array([SOON]), name)[0][0])
+        at = float(given_way(model, values, np.zeros(1), name)[0][0])
         frame, (bent, _) = frames[carriage.on], _bent(model, carriage.on, at)
         moved = frame.at(frame.attitude @ np.array([at, 0.0, 0.0]), bent)
         found += sum(float(model.study.value(f"carriage.{name}.{key}") or 0.0) for key in carriage.masses) * (
             moved.T @ moved
         )
     return found
-
-
-SOON = 1e-9  # s after the start

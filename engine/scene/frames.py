@@ -186,8 +186,8 @@ class Frame(Spec):
     its pitch inertia in all directions if not given. lateral_second_moment, lateral_modes: bending across the track;
     its supports are those of bending. axial_modes: stretching; torsion_modes, with shear_modulus and torsion_constant:
     twisting; both held where the track begins, unless both its ends are free. stiffening: places come nearer as the
-    body bends, so that what pulls at them stiffens it (first order); left out, where that changes results by what
-    counts.
+    body bends, so that what pulls at them stiffens it (first order); left out, it is taken where it changes what
+    is held by more than a small part of the tolerance.
     """
 
     on: Annotated[str, Noun('"ground" or the name of a body')] = GROUND

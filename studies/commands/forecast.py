@@ -140,8 +140,9 @@ def _converged(plan: Plan, lanes: Counts, halted: Callable[[], bool], scene: int
 def _of_convergence(plan: Plan, looked: Looked, threads: int) -> Forecast:
     """A study whose variants all converge by themselves, each chunk with tables of its own."""
     chunks = sum(1 for _ in plan.chunks(None, None))
-    part = looked.together * chunks / plan.size  # of a chunk that variants were which were looked at together
-    at_once, in_turns, more = looked.seconds * threads / max(part, 1.0), -(-chunks // threads), max(0.0, 1.0 - part)
+    filled = looked.together * chunks / plan.size  # chunks, by as many variants as were looked at together
+    at_once, in_turns = looked.seconds * threads / max(filled, 1.0), -(-chunks // threads)
+    more = max(0.0, 1.0 - filled)
     seconds = looked.start + at_once * in_turns + more * plan.seconds / min(threads, chunks)
     if not looked.parts:
         less = f"{PATIENCE:.0f} seconds were not enough for a variant to converge: this may take longer"

@@ -35,7 +35,8 @@ def told_low_contacts(results: Results, least: float | None) -> list[str]:
     do; nothing where no part is given."""
     if least is None:
         return []
-    parts = {name: _part_of_weight(results, name) for name, _ in _contact_forces(results)}
+    every = {name: _part_of_weight(results, name) for name, _ in _contact_forces(results)}
+    parts = {name: part for name, part in every.items() if np.isfinite(part).any()}
     if not parts:
         return []
     below = {name: np.nan_to_num(part, nan=np.inf) < least for name, part in parts.items()}

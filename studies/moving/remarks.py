@@ -199,13 +199,11 @@ def _stays_in_plane(model: FloatingModel, name: str) -> bool:
     from engine.floating.bodies.fields import ABOUT_X, ABOUT_Z
     from engine.kernels.floating.layout import PRISMATIC, REVOLUTE
 
-    body, turned = model.bodies[name], np.array(model.frame(name).turned)
+    turned = np.array(model.frame(name).turned)
     whole = {REVOLUTE: 1.0, PRISMATIC: 0.0}  # of an axis that is along y, of what turns and of what slides
     joints = (joint for joint in model.joints if joint.body == name)
     kept = all(abs(abs(joint.axis[Y]) - whole.get(joint.kind, np.inf)) < ROUNDING for joint in joints)
-    shapes = np.abs(body.fields(np.linspace(0.0, body.length, PLACES), (0,))[0]).max(axis=(0, 2), initial=0.0)
-    flat = (shapes[[Y, ABOUT_X, ABOUT_Z]] <= ROUNDING * shapes.max()).all()
-    return bool(kept and flat and not np.delete(turned, Y).any())
+    return bool(kept and not _bends(model.bodies[name], Y, ABOUT_X, ABOUT_Z) and not np.delete(turned, Y).any())
 
 
 def _moved_across(looked: Looked) -> Iterator[str]:
@@ -216,7 +214,7 @@ def _moved_across(looked: Looked) -> Iterator[str]:
     for joint in model.joints:
         number = count[joint.body] = count.get(joint.body, -1) + 1
         body, axis = model.bodies[joint.body], across.get(joint.kind)
-        if axis is None or not body.omega.size or abs(joint.axis[axis]) < 1.0 - ROUNDING or _bends_along_y(body):
+        if axis is None or not body.omega.size or abs(joint.axis[axis]) < 1.0 - ROUNDING or _bends(body, Y):
             continue
         how = "turns" if joint.kind == REVOLUTE else "pushes"
         yield (
@@ -225,10 +223,10 @@ def _moved_across(looked: Looked) -> Iterator[str]:
         )
 
 
-def _bends_along_y(body: ElasticBody) -> bool:
-    """Whether it bends across the plane of its loads."""
+def _bends(body: ElasticBody, *axes: int) -> bool:
+    """Whether its track moves along, or turns about, any of some axes as it bends."""
     shapes = np.abs(body.fields(np.linspace(0.0, body.length, PLACES), (0,))[0]).max(axis=(0, 2), initial=0.0)
-    return bool(shapes[Y] > ROUNDING * shapes.max())
+    return bool((shapes[list(axes)] > ROUNDING * shapes.max()).any())
 
 
 def _let_go(looked: Looked) -> Iterator[str]:

@@ -21,7 +21,7 @@ LOAD = {
 
 
 def bridge(**changes: Any) -> dict[str, Any]:
-    """Two spans' length of a deck without damping of its own, and a node at its middle."""
+    """A deck of one span without damping of its own, and a node at its middle."""
     return {
         "kind": "frame",
         "plane": "xz",
@@ -88,7 +88,7 @@ def test_it_hangs_lower_by_its_weight_over_its_spring() -> None:
 
 
 def test_its_spring_and_damper_are_swept_like_others() -> None:
-    """A softer one of the same damper takes less of the free vibration."""
+    """Every variant is the same study by itself."""
     sweep = {
         "stiffness": {"of": "body.bridge.spring.hung.stiffness.2", "values": [STIFFNESS / 4.0, STIFFNESS]},
         "damping": {"of": "body.bridge.spring.hung.damping.2", "values": [0.0, DAMPING]},

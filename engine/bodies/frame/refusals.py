@@ -146,7 +146,7 @@ def _check_tuned_mass(frame: Frame, node: str) -> None:
         for way, rate in zip(DIRECTIONS, (*spring.damping, *spring.rotational_damping), strict=True):
             if rate > 0.0 and way in stands and way not in (*frame.holds(node), *frame.still):
                 key = ("spring", name, "damping" if way in DIRECTIONS[:3] else "rotational_damping")
-                expected = f"a stiffness along {way} too" if way in DIRECTIONS[:3] else f"a stiffness {way} too"
+                expected = f"a {'stiffness along' if len(way) == 1 else 'rotational stiffness about'} {way[-1]} too"
                 refuse(key, f"a damper without a spring holds {node}, at which no member ends", expected=expected)
     for way in DIRECTIONS[3:]:
         inertias = [body.inertia[DIRECTIONS.index(way) - 3] for body in masses]

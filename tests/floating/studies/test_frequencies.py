@@ -73,6 +73,18 @@ def test_two_links_swing_as_fast_as_a_march_of_them() -> None:
     assert 2.0 * np.pi * peak == pytest.approx(float(omega[0]), rel=2e-3)
 
 
+def test_an_arm_on_a_rigid_hub_is_one_on_the_ground() -> None:
+    """Of a hub that is driven; one that turns freely about the arm, whose inertia there is none, is not told."""
+    hub = {"kind": "rigid", "length": 1.0, "mass": 3.0, "inertia": 2.0}
+    on_hub = arm({"kind": "revolute", "axis": [1, 0, 0]}, {"hub": hub}, {"hub": {"joints": [TURN]}})
+    frames = {"hub": {"joints": [TURN]}, "arm": {"on": "hub"}}
+    driven = natural_omega(build(Study(**(on_hub.data | {"frame": frames}))))
+    alone = natural_omega(build(arm(TURN, {}, {})))
+    assert driven is not None and alone is not None
+    np.testing.assert_allclose(driven, alone, rtol=1e-9)
+    assert natural_omega(build(on_hub)) is None
+
+
 def test_what_flies_freely_or_slides_is_not_told() -> None:
     flyer = Study(
         kind="moving-frames",
