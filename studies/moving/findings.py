@@ -4,11 +4,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from results_schema.lazy_imports import xr
 from results_schema.quantities import AFTER_STOP
 from studies.findings.absolute_errors import errors_of_size
 from studies.findings.amplification import sizes
 from studies.findings.beyond import limits_of, ranked, told_limit
-from studies.findings.effects import by_effect
+from studies.findings.effects import by_effect, told_effects
 from studies.results.findings_common import in_words, over_all, told_statuses, uncertainty, while_held
 from studies.results.formatting import counted, quantity
 from studies.results.places import extreme
@@ -73,7 +74,8 @@ def _ended(results: Results, seconds: float) -> Iterator[str]:
 
 def _sensors(results: Results) -> Iterator[str]:
     limits = limits_of(results.study)
-    for sensor in ranked(results, limits)[:MOST_SENSORS]:
+    told = ranked(results, limits)[:MOST_SENSORS]
+    for sensor in told:
         low, high = (results.dataset[f"{sensor}_{end}"].where(results.with_values) for end in ("min", "max"))
         if np.isnan(low.values).all():
             yield f"{sensor}: no variant has values."
@@ -84,14 +86,22 @@ def _sensors(results: Results) -> Iterator[str]:
             axis = next(iter(by_effect(results, largest)), None)
             error = errors_of_size(results, sensor)
             beyond = told_limit(results, sizes(results, sensor), limit, results.sensors[sensor], axis, error)
+        effects = _effects(results, sensor, largest) if sensor == told[0] else ""
         if results.study.sensor[sensor].reads.of_arm:
-            yield from _position_error(results, sensor, beyond)
+            yield from _position_error(results, sensor, beyond + effects)
             continue
         index = extreme(largest)
         assert index is not None
         span = _span(low.values[index], high.values[index], results.sensors[sensor])
         what = f"{while_held(results)}the {results.noun(sensor)}"
-        yield f"{sensor}: {what} goes from {span}{in_words(results, index)}.{beyond}"
+        yield f"{sensor}: {what} goes from {span}{in_words(results, index)}.{beyond}{effects}"
+
+
+def _effects(results: Results, sensor: str, largest: xr.DataArray) -> str:
+    """What every swept number does to the largest value of a sensor, behind another sentence; "" where one is swept."""
+    values = largest.transpose(*results.dims).values
+    said = told_effects(results, values, f"the largest {results.noun(sensor)}", errors_of_size(results, sensor))
+    return f" {said}" if said else ""
 
 
 def _position_error(results: Results, sensor: str, beyond: str) -> Iterator[str]:

@@ -77,6 +77,17 @@ def test_another_body_does_not_stand_beside_the_paper() -> None:
     assert "Hartweg" in "".join(KIND.findings(Results.of(found)))
 
 
+def test_what_each_swept_number_does_is_told() -> None:
+    """Of the sensor that the answer begins with: the worst of all others that are swept, in one march and another."""
+    stiffness = {"of": "body.beam.youngs_modulus", "values": [2.1e11, 4.2e11]}
+    swept = {"mass": SWEPT["mass"], "stiffness": stiffness}
+    dataset = studies.run(paper(0.5, sensor={"middle": {"body": "beam", "at": 7.5}}, sweep=swept))
+    said = " ".join(KIND.findings(Results.of(dataset)))
+    size = np.maximum(np.abs(dataset["middle_max"]), np.abs(dataset["middle_min"])).max("mass").values
+    fall = re.search(r"With the worst .* the largest displacement falls by (\S+) % over stiffness 210 to 420 GPa", said)
+    assert fall is not None and float(fall[1]) == pytest.approx(100.0 * (1.0 - size[1] / size[0]), abs=0.5)
+
+
 def test_a_kind_with_figures() -> None:
     dataset = studies.run(paper())
     names = [figure.name for figure in studies.figures(dataset)]
