@@ -96,7 +96,7 @@ def page_of(study: Study, remarks: Sequence[str]) -> SimpleNamespace:
         facts=[Row("kind of study", study.kind), Row("variants", f"{variants:,}"), *trains],
         remarks=[f"{text[0].upper()}{text[1:]}." for text in (*remarks, *unused)],
         figures=drawn,
-        shapes=[*(_of_body(model, body) for body in scene.bodies.values()), *_of_whole(model)],
+        shapes=[*(_of_body(model, body) for body in scene.bodies.values() if _moves(study, body)), *_of_whole(model)],
         tables=[
             _without_empty(table)
             for table in (_bodies(scene), _supports(scene), _trains(study), _carriages(scene, study), _sensors(scene))
@@ -111,6 +111,11 @@ def _without_empty(table: Table) -> Table:
     kept = [place for place in range(len(table.headings)) if any(row[place] for row in table.rows)]
     rows = [[row[place] for place in kept] for row in table.rows]
     return table._replace(headings=[table.headings[place] for place in kept], rows=rows)
+
+
+def _moves(study: Study, body: Placed) -> bool:
+    """Whether a body has modes of its own: a rigid one in a frame moves as its frame does."""
+    return body.part.name not in study.frame or bool(body.part.modal.omega.any())
 
 
 def _of_body(model: SceneModel, body: Placed) -> Shapes:

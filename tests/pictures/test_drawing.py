@@ -347,6 +347,7 @@ def test_bodies_in_frames_that_move_stand_where_they_are_marched_from(tmp_path: 
     np.testing.assert_allclose(placed.loaded("wind")[[0, -1]], placed.bodies["arm"].along(np.array([1.0, 3.0])))
     text = write_drawing(scene, tmp_path / "drawing").read_text(encoding="utf-8")
     assert "their springs and loads" in text
+    assert "Mode shapes of arm" in text and "Mode shapes of rod" not in text  # rigid: it moves as its frame does
 
 
 def test_robots_stand_where_their_plans_begin() -> None:
