@@ -147,12 +147,16 @@ class _Pushes:
             )
         return found
 
+    def along(self, direction: Direction) -> LinePushes:
+        """Of forces in one direction."""
+        return self.found[direction]
+
 
 def _side(direction: Direction, line: LineShapes, ends: Array, pushes: _Pushes) -> LineSide:
     """Motion of the track in another direction than its loads', from values and slopes (2 P, N) of all modes."""
     shapes = replace(line, ends=np.ascontiguousarray(ends))
     wave_number = _wave_number(shapes, np.abs(ends[::2]).max(axis=0))
-    return LineSide(direction, wave_number, shapes, lambda: pushes.found[direction])
+    return LineSide(direction, wave_number, shapes, partial(pushes.along, direction))
 
 
 def _settled_modes(body: Imported, held: HeldModel, rows: Any, slopes: Array) -> tuple[Array, Array, Array]:

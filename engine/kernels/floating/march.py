@@ -51,7 +51,7 @@ from engine.kernels.floating.state import (
 )
 from engine.kernels.floating.vectors import after, keep_matrix, matrix, rotation
 from engine.kernels.floating.work import room, three_at
-from engine.kernels.jit import called, kernel, piece
+from engine.kernels.jit import called, copied, kernel
 from engine.kernels.layout import LANES, FloatArray
 from engine.kernels.vector import all_lanes, choose, everywhere, lanes_at, put_lanes
 
@@ -190,7 +190,7 @@ def go_through(system, lane, scheme, number, state, solver):
     put_where(shorter, memory, (FRESH,), all_lanes(0.0))
 
 
-@piece
+@copied
 def room_to_march(system, lane, record):
     """Room for a block of lanes."""
     N, M = lane.start.shape[1], lane.motions.shape[0]

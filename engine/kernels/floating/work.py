@@ -6,7 +6,7 @@ import numpy as np
 
 from engine.kernels.floating.layout import PIECE
 from engine.kernels.floating.tracks import AT_PLACE, GATHERED
-from engine.kernels.jit import called, piece
+from engine.kernels.jit import called, copied
 from engine.kernels.layout import LANES, FloatArray, IntArray
 from engine.kernels.vector import lanes_at, put_lanes
 
@@ -48,7 +48,7 @@ class Work(NamedTuple):
     rigid: FloatArray
 
 
-@piece
+@copied
 def room(system, lane):
     """Work for a block of lanes, the joints not turned yet."""
     widest = system.track.shape[4]

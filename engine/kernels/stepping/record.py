@@ -5,7 +5,7 @@ Extremes are judged by forms like ``old if x <= old else x``, which let a NaN th
 
 import numpy as np
 
-from engine.kernels.jit import piece
+from engine.kernels.jit import copied, piece
 from engine.kernels.layout import (
     BELOW_AT,
     BOUND,
@@ -81,7 +81,7 @@ def load_weights(b, lanes, block):
             b[TIE + ties + c, j] = lanes.weight[block, c, j] * (lanes.step[block, j] * lanes.step[block, j])
 
 
-@piece
+@copied
 def observe(statistics, now, b, watch, n, leads):
     """Signals of station n in SI units: offset g + sums over the modes + static correction times contact force (and,
     of dynamic parts, times what carriages weigh).
@@ -161,7 +161,7 @@ def judge_lanes(status, statistics, q, v, block):
                 status[block, j] = DIVERGED
 
 
-@piece
+@copied
 def judge(statistics, i, now):
     """Update the extremes of signal i with its value, and what is known where its value is an extreme for the first
     time: that it is negative, and that it has left every meaning."""
