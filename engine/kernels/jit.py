@@ -124,8 +124,8 @@ def piece(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def copied(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile a function that is copied into its callers before these are compiled: one that makes arrays. Else callers
-    take longer to compile than with `piece`; the march is faster by a seventh where it copies what every signal takes."""
+    """Compile a function that is copied into its callers before these are compiled: one that makes arrays. Others take
+    longer to compile than with `piece`; the march is faster by a seventh where it copies what every signal takes."""
     return cast(Callable[..., Any], numba.njit(inline="always", **_POLICY)(function))
 
 

@@ -61,6 +61,11 @@ class Rider:
         found = self.motion.path_on(own, max(first, 0.0), min(last, self.motion.duration))
         return Path(found.S + self.offset, found.dS * self.pace, found.ddS * self.pace**2)
 
+    def path_on_body(self, tau: Array, start: float, end: float) -> Path:
+        """`path` on a segment on which it is on the body, which rounding must not leave."""
+        path = self.path(tau, start, end)
+        return path._replace(S=np.clip(path.S, 0.0, self.length))
+
     def _own(self, tau: float) -> float:
         """The motion's own time; exactly that of an event where rounding puts it beside one."""
         own = (tau - self.delay) * self.pace

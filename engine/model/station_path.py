@@ -139,8 +139,8 @@ def _way(rider: Rider, segment: Segment, tau: Array, active: bool, highest: int)
     if not active:
         nowhere = np.zeros_like(tau)
         return StationPath(nowhere, nowhere, nowhere, active, highest=highest)
-    path = rider.path(tau, segment.start, segment.end)
-    place = np.clip(path.S, 0.0, rider.length)  # rounding must not leave the body
+    path = rider.path_on_body(tau, segment.start, segment.end)
+    place = path.S
     for end, inward, jumps in ((0, 1.0, segment.jumps[0]), (-1, -1.0, segment.jumps[1])):
         if jumps:
             place[end] += inward * BESIDE * rider.length * np.sign(path.dS[end])

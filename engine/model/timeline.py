@@ -117,7 +117,7 @@ class Timeline:
         for number in np.flatnonzero(np.bincount(index[shown], minlength=len(self.segments))):
             segment = self.segments[number]
             here = shown & (index == number)
-            path = self.riders[rider].path(tau[here], segment.start, segment.end)
+            path = self.riders[rider].path_on_body(tau[here], segment.start, segment.end)
             for part, values in zip(found, path, strict=True):
                 part[here] = values
         return found

@@ -227,6 +227,6 @@ def _here(model: SceneModel, segment: Segment) -> Along:
     """All riders as they are at the beginning of a segment."""
     found, at, still = [], np.array([segment.start]), np.zeros(1)
     for rider, active in zip(model.riders, segment.active, strict=True):
-        place = rider.path(at, segment.start, segment.end).S if active else still
-        found.append(StationPath(np.clip(place, 0.0, rider.length), still, still, active))
+        place = rider.path_on_body(at, segment.start, segment.end).S if active else still
+        found.append(StationPath(place, still, still, active))
     return tuple(found)

@@ -126,7 +126,7 @@ def first_place_counted(model: SceneModel, timeline: Timeline, carriage: int) ->
     for segment in timeline.segments:
         if segment.recorded and segment.active[carriage]:
             tau: Array = segment.start + np.arange(segment.steps + 1, dtype=np.float64) * segment.step
-            place = np.clip(tie.rider.path(tau, segment.start, segment.end).S, 0.0, tie.rider.length)
+            place = tie.rider.path_on_body(tau, segment.start, segment.end).S
             counted = np.flatnonzero((place >= low) & (place <= high))
             if counted.size:
                 return float(place[counted[0]])

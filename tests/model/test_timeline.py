@@ -79,6 +79,19 @@ def test_position_at_an_arrival_and_a_departure() -> None:
 SENSORS = {"midspan": fixed(0.5), "moment": fixed(0.3, "bending_moment"), "below": under("car")}
 
 
+def test_rounding_does_not_leave_the_body() -> None:
+    """Of a carriage that comes on as another one does, but for rounding: one step boundary serves both, where its own
+    path is beyond the end."""
+    rider = Rider(Cruise(kind="cruise", start=143.0, end=0.0, speed=1.0), 35.0, 0.25)
+    late = Rider(PASSAGE, 1.0, 1.0, next(rider.passes(35.0)) - 3e-12)
+    timeline = build_timeline((rider, late), 97, "whole")
+    beyond = [rider.path(np.array([one.start]), one.start, one.end).S[0] for one in timeline.segments if one.active[0]]
+    places = timeline.positions(0, np.arange(timeline.steps + 1))
+    known = places[np.isfinite(places)]
+    assert max(beyond) > 35.0 * (1.0 + 1e-12)
+    assert known.min() >= 0.0 and known.max() == 35.0
+
+
 @pytest.mark.parametrize("way", [swing(0.5, 0.4, 0.7, 3), shuttle(0.2, 0.8, 0.9, 0.1, 3)])
 def test_cycle_of_a_reduction(way: dict[str, Any]) -> None:
     """The last of three cycles with both ends: equidistant phases, mirrored places, the march's histories, exact
