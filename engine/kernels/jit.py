@@ -129,7 +129,7 @@ def copied(function: Callable[..., Any]) -> Callable[..., Any]:
     return cast(Callable[..., Any], numba.njit(inline="always", **_POLICY)(function))
 
 
-def _part_of_kernels(function: Callable[..., Any], **options: bool) -> Callable[..., Any]:
+def _part_of_kernels(function: Callable[..., Any], **options: Any) -> Callable[..., Any]:
     bare: dict[str, Any] = {
         "no_cpython_wrapper": True,
         "no_cfunc_wrapper": True,

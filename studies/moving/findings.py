@@ -4,7 +4,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from results_schema.lazy_imports import xr
 from results_schema.quantities import AFTER_STOP
 from studies.findings.absolute_errors import errors_of_size
 from studies.findings.amplification import sizes
@@ -86,7 +85,7 @@ def _sensors(results: Results) -> Iterator[str]:
             axis = next(iter(by_effect(results, largest)), None)
             error = errors_of_size(results, sensor)
             beyond = told_limit(results, sizes(results, sensor), limit, results.sensors[sensor], axis, error)
-        effects = _effects(results, sensor, largest) if sensor == told[0] else ""
+        effects = _effects(results, sensor) if sensor == told[0] else ""
         if results.study.sensor[sensor].reads.of_arm:
             yield from _position_error(results, sensor, beyond + effects)
             continue
@@ -97,10 +96,11 @@ def _sensors(results: Results) -> Iterator[str]:
         yield f"{sensor}: {what} goes from {span}{in_words(results, index)}.{beyond}{effects}"
 
 
-def _effects(results: Results, sensor: str, largest: xr.DataArray) -> str:
+def _effects(results: Results, sensor: str) -> str:
     """What every swept number does to the largest value of a sensor, behind another sentence; "" where one is swept."""
-    values = largest.transpose(*results.dims).values
-    said = told_effects(results, values, f"the largest {results.noun(sensor)}", errors_of_size(results, sensor))
+    said = told_effects(
+        results, sizes(results, sensor), f"the largest {results.noun(sensor)}", errors_of_size(results, sensor)
+    )
     return f" {said}" if said else ""
 
 

@@ -9,13 +9,13 @@ import numpy as np
 from engine.bodies.frame.geometry import unit
 from engine.bodies.imported.line import SPLINE_NODES, LineShapes, by_rotations, node_rows, spline_slopes
 from engine.bodies.imported.model import HeldModel
-from engine.bodies.modal.modal_body import Array
 from results_schema.lazy_imports import sparse
 
 if TYPE_CHECKING:
     from engine.bodies.imported.imported import Imported
 
 
+FITS = 1e-6  # of the stiffness: less resists rigid motions by rounding
 SAME_MASS = 1e-6  # relative difference of the mass in three directions that is still one mass
 SHEAR = 0.02  # relative difference of rotations and slopes beyond which the spline is worth a thought
 
@@ -43,40 +43,60 @@ def findings(body: Imported, held: HeldModel, along: LineShapes) -> tuple[tuple[
 
 
 def _grounding(held: HeldModel) -> str:
-    """Forces that the unsupported model answers to unit motions, of the largest possible: 0 where all fits."""
+    """Whether the coordinates fit the matrices, in words."""
+    worst = _resisted(held)
+    if worst is None:
+        return "not judged: the file holds nodes"
+    more = " (0 for a model that nothing holds)" if worst > FITS else ""
+    return f"{worst:.2g} of the stiffness resists them{more}"
+
+
+def _resisted(held: HeldModel) -> float | None:
+    """Forces that the unsupported model answers to unit motions, of the largest possible: 0 where all fits; None where
+    the file holds nodes."""
     file = held.file
     if file.held.any() or not (file.owner >= 0).any():
-        return "not judged: the file holds nodes"
+        return None
     diagonal = np.sqrt(np.maximum(file.stiffness.diagonal(), 0.0))
     size = np.linalg.norm(diagonal[:, None] * held.motion, axis=0)
     inverse = np.divide(1.0, diagonal, out=np.zeros_like(diagonal), where=diagonal > 0.0)
     scaled = sparse.diags_array(inverse) @ file.stiffness @ held.motion
     share = np.linalg.norm(scaled, axis=0) / np.where(size > 0.0, size, 1.0)
-    worst = float(share.max())
-    return f"{worst:.2g} of the stiffness resists them" + (
-        " (0 for a model that nothing holds)" if worst > 1e-6 else ""
-    )
+    return float(share.max())
 
 
 def _mass(held: HeldModel) -> str:
-    masses = np.diag(held.inertia)[:3]
-    if np.ptp(masses) <= SAME_MASS * masses.max():
-        return f"{masses[0]:.6g} kg in all directions"
-    return f"{masses[0]:.6g}, {masses[1]:.6g}, {masses[2]:.6g} kg along x, y, z: not the same"
+    """What unit motions of all nodes move: the same in every direction in which nodes move, of a model that fits."""
+    moved = {axis: mass for axis, mass in zip("xyz", np.diag(held.inertia)[:3], strict=True) if mass > 0.0}
+    masses, ways = np.array([*moved.values(), 0.0][: len(moved) or 1]), ", ".join(moved) or "x, y, z"
+    if np.ptp(masses) > SAME_MASS * masses.max():
+        words = f"{', '.join(f'{mass:.6g}' for mass in masses)} kg along {ways}: not the same"
+    else:
+        words = f"{masses[0]:.6g} kg {'in all directions' if len(moved) == 3 else f'along {ways}'}"
+    resisted = _resisted(held)
+    partly = resisted is not None and resisted > FITS
+    return f"{words}; what moves at held or left out nodes is not counted" if partly else words
 
 
 def _centre(body: Imported, held: HeldModel) -> str:
-    """From the static moments of the mass matrix; it lies among the nodes of a model that fits its coordinates."""
-    inertia = held.inertia
-    mass = np.diag(inertia)[:3].mean()
-    if mass <= 0.0:
+    """From the static moments of the mass matrix, in the directions in which nodes move; it lies among the nodes of a
+    model that fits its coordinates."""
+    mass = np.diag(held.inertia)[:3]
+    if mass.max() <= 0.0:
         return "no mass"
-    centre: Array = np.array([inertia[1, 5], inertia[2, 3], inertia[0, 4]]) / mass
     places = held.file.places * body.length_unit
     low, high = places.min(axis=0), places.max(axis=0)
-    room = 1e-6 * float(np.ptp(places, axis=0).max())
-    inside = bool(((centre >= low - room) & (centre <= high + room)).all())
-    words = ", ".join(f"{part + 0.0:.5g}" for part in np.where(np.abs(centre) < room, 0.0, centre))
+    room, centre = 1e-6 * float(np.ptp(places, axis=0).max()), np.full(3, np.nan)
+    for axis, turns in enumerate(((1, 5, 2, 4), (2, 3, 0, 5), (0, 4, 1, 3))):
+        one, its, other, others = turns  # a unit turn moves a point at r by its axis x r
+        size = mass[one] ** 2 + mass[other] ** 2
+        if size > 0.0:
+            moment = mass[one] * held.inertia[one, its] - mass[other] * held.inertia[other, others]
+            centre[axis] = moment / size
+    known = np.isfinite(centre)
+    inside = bool(((centre >= low - room) & (centre <= high + room))[known].all())
+    rounded = np.where(np.abs(centre) < room, 0.0, centre)
+    words = ", ".join(f"{part:.5g}" if np.isfinite(part) else "unknown" for part in rounded)
     return f"({words}) m, {'among' if inside else 'outside'} the nodes"
 
 

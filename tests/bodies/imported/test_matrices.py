@@ -117,6 +117,28 @@ def test_a_body_that_nothing_holds(loose: Files) -> None:
     assert float(said["rigid motions by the coordinates"].split()[0]) < 1e-10
 
 
+@pytest.mark.parametrize(("kept", "ways", "centre"), [((0, 2, 4), "x, z", "0.4"), ((2, 4), "z", "unknown")])
+def test_the_mass_of_a_plane_model(loose: Files, tmp_path: Path, kept: tuple[int, ...], ways: str, centre: str) -> None:
+    """Nodes that move in some directions only, beside the origin: mass and centre are told of these."""
+    rows = np.flatnonzero(np.isin(loose.assembly.free % 6, kept))
+    places = {name: str(tmp_path / name) for name in ("nodes.csv", "freedoms.csv", "mass.npz", "stiffness.npz")}
+    points = [f"{number},{x!r},-0.2,0.4" for number, x in enumerate(loose.assembly.mesh.points[:, 0].tolist(), start=1)]
+    lines = (loose.folder / "freedoms.csv").read_text(encoding="utf-8").splitlines()
+    for name, text in (
+        ("nodes.csv", ["node,x,y,z", *points]),
+        ("freedoms.csv", [lines[0], *(lines[r + 1] for r in rows)]),
+    ):
+        Path(places[name]).write_text("\n".join(text), encoding="utf-8")
+    for name, matrix in (("mass.npz", loose.assembly.mass), ("stiffness.npz", loose.assembly.stiffness)):
+        save_npz(places[name], csc_matrix(matrix)[rows][:, rows])
+    track = {"from": [0, -0.2, 0.4], "to": [LENGTH, -0.2, 0.4]}
+    supports = {"1": [("x", "y", "z", "rx", "ry", "rz")[way] for way in kept]}
+    files = {name.partition(".")[0]: place for name, place in places.items()}
+    said = dict(modal(loose.table(**files, track=track, supports=supports)).checks)
+    assert said["mass by rigid motions"] == f"{body(straight({}, elements=12)).mass:.6g} kg along {ways}"
+    assert said["centre of mass"] == f"(7.5, -0.2, {centre}) m, among the nodes"
+
+
 def test_massless_degrees_of_freedom(tmp_path: Path) -> None:
     table = straight(PINNED, elements=8, mass_matrix="lumped")
     files = Files(tmp_path, table)
