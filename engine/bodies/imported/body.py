@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from engine.bodies.imported.imported import Imported
 
 
+ABOUT_MODES = ("modes",)  # what the statics do not depend on
 MOST_SAMPLES = 4001  # places where the wave numbers of shapes are read
 _COLUMNS = 64
 _UNFELT = 1e-9  # of the largest displacement: below it a mode does not move the track
@@ -46,10 +47,16 @@ _Parts = tuple[Array, Any, Array, Array, Array]  # mode shapes, track's rows and
 
 @dataclass(frozen=True)
 class _Content:
-    """A body by what its modes depend on, so that the variants of a sweep share them."""
+    """A body by what its modes and statics depend on, so that the variants of a sweep share them."""
 
     text: str
     body: Imported = field(compare=False)
+
+    @classmethod
+    def of(cls, body: Imported, without: Iterable[str] = ()) -> _Content:
+        """All that matters to a body without damping and own weight, besides the keys ``without``."""
+        left_out = dict.fromkeys(("damping_ratio", "own_weight", *without), True)
+        return cls(body.model_dump_json(exclude=left_out) + body.content, body)
 
 
 def imported_body(body: Imported, spots: Spots = ()) -> ModalBody:
@@ -57,8 +64,7 @@ def imported_body(body: Imported, spots: Spots = ()) -> ModalBody:
 
     Raises BadInput, with the key within the body as its place, for a model that cannot be a body as it stands.
     """
-    text = body.model_dump_json(exclude={"damping_ratio": True, "own_weight": True}) + body.content
-    return _imported_body(_Content(text, body), spots)
+    return _imported_body(_Content.of(body), spots)
 
 
 @lru_cache(maxsize=8)
@@ -71,19 +77,10 @@ def _imported_body(content: _Content, spots: Spots) -> ModalBody:
 
 
 def _modal_body(body: Imported, spots: Spots) -> tuple[ModalBody, LineStatics]:
-    held, places = held_model(body), body.line.places
-    rows, slopes = track_rows(body, held)
+    held, rows, slopes, pull, statics = _whole(_Content.of(body, ABOUT_MODES))
     omega, ends, shapes = _settled_modes(body, held, rows, slopes)
     gravity = unit(body.gravity_direction)
-    pull = held.drag @ gravity
-    flexibility = held.flexibility
-    statics = LineStatics(
-        places=places,
-        flexibility=slopes @ _symmetric(_between(flexibility, rows, rows)) @ slopes.T,
-        weight=slopes @ (rows.T @ flexibility.solve(pull[:, None]))[:, 0],
-        rigid=flexibility.rigid.shape[1],
-    )
-    line = LineShapes(places, np.ascontiguousarray(ends))
+    line = LineShapes(body.line.places, np.ascontiguousarray(ends))
     names, loads = _point_loads(body, held)
     parts = shapes, rows, slopes, pull, loads
     sections, stresses = _sections(body, held, statics, parts)
@@ -113,6 +110,31 @@ def _modal_body(body: Imported, spots: Spots) -> tuple[ModalBody, LineStatics]:
     return found, statics
 
 
+class _Whole(NamedTuple):
+    """A body with all that its finite elements can do: the held model, track_rows, pull of gravity, and statics."""
+
+    held: HeldModel
+    rows: Any
+    slopes: Array
+    pull: Array
+    statics: LineStatics
+
+
+@lru_cache(maxsize=8)
+def _whole(content: _Content) -> _Whole:
+    body = content.body
+    held = held_model(body)
+    rows, slopes = track_rows(body, held)
+    flexibility, pull = held.flexibility, held.drag @ unit(body.gravity_direction)
+    statics = LineStatics(
+        places=body.line.places,
+        flexibility=slopes @ _symmetric(_between(flexibility, rows, rows)) @ slopes.T,
+        weight=slopes @ (rows.T @ flexibility.solve(pull[:, None]))[:, 0],
+        rigid=flexibility.rigid.shape[1],
+    )
+    return _Whole(held, rows, slopes, pull, statics)
+
+
 @dataclass(frozen=True, eq=False)
 class _Pushes:
     """What forces on a track in other directions than its loads' do. Few studies ask for that, so the model is
@@ -126,7 +148,7 @@ class _Pushes:
     @cached_property
     def found(self) -> dict[Direction, LinePushes]:
         """By direction."""
-        body, held = self.body, held_model(self.body)
+        body, held = self.body, _whole(_Content.of(self.body, ABOUT_MODES)).held
         sides, (names, loads) = side_rows(body, held), _point_loads(body, held)
         tracks = {"load": track_rows(body, held), **sides}
         gauges = [_node_load(body, held, spot.node, spot.direction)[:, None] for _, spot in self.spots]
@@ -169,8 +191,8 @@ def _settled_modes(body: Imported, held: HeldModel, rows: Any, slopes: Array) ->
 
 def motion_of_nodes(body: Imported) -> tuple[HeldModel, Array]:
     """The held model, and (M, 3, N) displacements of its nodes in every mode; nodes without rows stay."""
-    held = held_model(body)
-    _, _, shapes = _settled_modes(body, held, *track_rows(body, held))
+    held, rows, slopes, _, _ = _whole(_Content.of(body, ABOUT_MODES))
+    _, _, shapes = _settled_modes(body, held, rows, slopes)
     owner, way = held.file.owner[held.free], held.file.direction[held.free]
     moves = (owner >= 0) & (way < 3)
     found = np.zeros((len(held.file.nodes), 3, shapes.shape[1]))

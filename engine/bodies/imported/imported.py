@@ -96,6 +96,10 @@ class Imported(Body):
     rigid_body_modes: Annotated[str, AfterValidator(one_of("keep", "drop"))] = "keep"
 
     @property
+    def modes_are_open(self) -> bool:
+        return self.modes == "auto" and self.rigid_body_modes == "keep"
+
+    @property
     @abstractmethod
     def request(self) -> Request:
         """What is to be read."""

@@ -247,6 +247,24 @@ def test_a_passage_is_the_frames(files: Files) -> None:
 
 
 @pytest.mark.usefixtures("own_process")
+def test_modes_that_are_left_open_hold_the_tolerance(files: Files) -> None:
+    """Against all that a study may ask for: what is told is no less than the difference."""
+    found, most = (
+        engine.run(study(files.table(damping_ratio=0.01) | more, solver={"tolerance": 1e-4}))
+        for more in ({}, {"modes": 64})
+    )
+    off = abs(float(found["middle_max"] / most["middle_max"]) - 1.0)
+    assert int(found["status"]) == 0 and 12 < int(found["modes_used"]) <= 64
+    assert 0.0 < off <= float(found["estimated_error"].sel(result="middle_max")) < 1e-4
+
+
+def test_modes_of_bodies_that_drop_rigid_ones_are_not_left_open(loose: Files) -> None:
+    """Few of them would all be rigid."""
+    kept, dropped = (Matrices.model_validate(loose.table(rigid_body_modes=word)) for word in ("keep", "drop"))
+    assert kept.modes_are_open and not dropped.modes_are_open
+
+
+@pytest.mark.usefixtures("own_process")
 def test_checks_are_printed_and_the_key_follows_the_files(files: Files, tmp_path: Path) -> None:
     copy = Files(tmp_path, straight(PINNED, elements=16))
     given = study(copy.table())
