@@ -218,7 +218,7 @@ def _with_more_modes(study: Study, times: int) -> Study:
     frames = {}
     for name, frame in study.frame.items():
         counts = {key: getattr(frame, key) for key in ("lateral_modes", "axial_modes", "torsion_modes")}
-        more = {key: min(times * count, MAX_MODES) for key, count in counts.items()}
+        more = {key: min(times * count, MAX_MODES) for key, count in counts.items() if count is not None}
         frames[name] = frame.model_copy(update=more)
     return study.model_copy(update={"body": bodies, "frame": frames})
 

@@ -183,11 +183,11 @@ class Frame(Spec):
     on: "ground" or the body that it hangs on. at: m along the track of that body, its end if not given. position: m
     over the ground, of a body that hangs there. turned: rotation vector (rad) of the frame before its joints. joints:
     from what it hangs on outward; none: it is fixed. inertia: of a rigid body about its centre of mass (kg m2), about
-    its pitch inertia in all directions if not given. lateral_second_moment, lateral_modes: bending across the track;
-    its supports are those of bending. axial_modes: stretching; torsion_modes, with shear_modulus and torsion_constant:
-    twisting; both held where the track begins, unless both its ends are free. stiffening: places come nearer as the
-    body bends, so that what pulls at them stiffens it (first order); left out, it is taken where it changes what
-    is held by more than a small part of the tolerance.
+    its pitch inertia in all directions if not given. lateral_second_moment, lateral_modes: bending across the track,
+    by as many modes as along its loads if not given; its supports are those of bending. axial_modes: stretching;
+    torsion_modes, with shear_modulus and torsion_constant: twisting; both held where the track begins, unless both its
+    ends are free. stiffening: places come nearer as the body bends, so that what pulls at them stiffens it (first
+    order); left out, it is taken where it changes what is held by more than a small part of the tolerance.
     """
 
     on: Annotated[str, Noun('"ground" or the name of a body')] = GROUND
@@ -197,7 +197,7 @@ class Frame(Spec):
     joints: Annotated[Several[AnyJoint], Field(max_length=MOST_JOINTS)] = ()
     inertia: Inertias | None = None
     lateral_second_moment: SecondMoment | None = Field(default=None, gt=0)
-    lateral_modes: int = Field(default=0, ge=0, le=32)
+    lateral_modes: int | None = Field(default=None, ge=0, le=32)
     axial_modes: int = Field(default=0, ge=0, le=32)
     torsion_constant: SecondMoment | None = Field(default=None, gt=0)
     shear_modulus: Pressure | None = Field(default=None, gt=0)

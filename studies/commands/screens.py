@@ -269,7 +269,8 @@ def show_comparison(found: Comparison) -> None:
         headings = ("result", "first", "second", "apart", "errors", "beyond", *["untold"] * untold)
         table(title, headings, [(*own, *count) for own, count in zip(values, counts, strict=True)])
         ends = [(one.name, *_quantities(one, *one.extremes), one.where) for one in apart]
-        table("Values of largest size", ("result", "first", "second", "they differ most at"), ends)
+        smallest = ", of what ends in _min the smallest" * any(one.name.endswith("_min") for one in apart)
+        table(f"Values of largest size{smallest}", ("result", "first", "second", "they differ most at"), ends)
     if found.only_in_one:
         paragraphs(f"Only in one of them, or in another shape: {', '.join(found.only_in_one)}.")
     same = [one.name for one in found.differences if not one.largest]

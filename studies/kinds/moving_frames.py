@@ -17,7 +17,7 @@ from studies.findings.beyond import Limits
 from studies.moving import findings
 from studies.moving.parts import AUDIT_SECONDS, gather
 from studies.moving.variables import RESULTS
-from studies.protocol.parts import Foreseen, Piece, TextTable, Work
+from studies.protocol.parts import Foreseen, Piece, TextTable, Took, Work
 from studies.protocol.study import PiecedKind, question_of
 from studies.results.results import Results
 
@@ -78,6 +78,11 @@ class MovingFrames(PiecedKind):
         from studies.moving.parts import again
 
         return again(study, _duration(study), variants, work)
+
+    def took(self, dataset: xr.Dataset) -> Took:
+        from studies.moving.parts import took
+
+        return took(dataset)
 
     def foreseen(self, study: Study, threads: int, audited: int) -> Foreseen:
         from studies.moving.preview import foreseen

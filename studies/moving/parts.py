@@ -14,7 +14,7 @@ from results_schema.arrays import Array, Counts
 from results_schema.errors import BadInput
 from studies.moving.ways import refuse_ways
 from studies.protocol.converged import HISTORY, Told, labelled
-from studies.protocol.parts import Piece, Work, unlabelled
+from studies.protocol.parts import Piece, Took, Work, unlabelled
 from studies.results.places import spread
 
 if TYPE_CHECKING:
@@ -164,6 +164,18 @@ def _march(
     parts = [found[first] for first in sorted(found)]
     whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     return unlabelled({name: array for name, array in whole.items() if array.size})  # none may have a history
+
+
+def took(dataset: xr.Dataset) -> Took:
+    """Seconds, about, of the marches that gave results, and of one audited variant, alone in its lanes: the same once
+    more, and a level beyond with more modes."""
+    from engine.floating.converge import MORE_MODES
+    from engine.kernels.layout import LANES
+
+    modes, steps = (dataset[name].values.astype(np.float64) for name in ("modes_used", "steps_used"))
+    each = LEVELS_TAKEN / 2.0 * steps * (STEP_SECONDS + COORDINATE_SECONDS * modes)
+    beyond = 2.0 * steps * (STEP_SECONDS + COORDINATE_SECONDS * MORE_MODES * modes)
+    return Took(float(max(each.sum(), LANES * each.max())), LANES * float((each + beyond).max()))
 
 
 def again(

@@ -190,7 +190,7 @@ def _nothing_across(looked: Looked) -> Iterator[str]:
         carriers = model.carriers(str(sensor.body))
         if abs(sensor.way[1]) > 1.0 - ROUNDING and all(_stays_in_plane(model, carrier) for carrier in carriers):
             bending = " or ".join(f"frame.{carrier}" for carrier in carriers if model.bodies[carrier].omega.size)
-            remedy = f": lateral_modes of {bending} bring that" if bending else ""
+            remedy = f": a lateral_second_moment of {bending} brings that" if bending else ""
             yield f"sensor {name} reads 0: nothing that carries it moves or bends along y over the ground{remedy}"
 
 
@@ -218,8 +218,8 @@ def _moved_across(looked: Looked) -> Iterator[str]:
             continue
         how = "turns" if joint.kind == REVOLUTE else "pushes"
         yield (
-            f"frame.{joint.body}.joints.{number} {how} {joint.body} across the plane in which it bends: lateral_modes "
-            f"of frame.{joint.body}, with its lateral_second_moment, let it bend along y too"
+            f"frame.{joint.body}.joints.{number} {how} {joint.body} across the plane in which it bends: a "
+            f"lateral_second_moment of frame.{joint.body} lets it bend along y too"
         )
 
 

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from engine.scene.study import Study
     from studies.protocol.study import Kind, PiecedKind
 
+MOST_TIMES, PATIENCE = 2.0, 10.0  # of the time of a run, and s, beyond which one audited variant is too dear
 PIECES_BYTES = 64 * 2**20  # more than what studies that measure leave on the disk
 GRACE_SECONDS = 1.0  # for a piece to end by itself when it is to stop
 USED = "_used"  # the end of the names of what a variant was computed with
@@ -263,6 +264,13 @@ class Foreseen(NamedTuple):
     remark: str = ""
 
 
+class Took(NamedTuple):
+    """Seconds, about, of all marches of a study, and of one variant that is computed again."""
+
+    whole: float
+    again: float
+
+
 class Pieces:
     """Pieces by name: one after another on the threads of this process, side by side on workers. Raises BadInput where
     the study asks for what only variants have."""
@@ -293,6 +301,14 @@ class Pieces:
             return 0 if wanted == "auto" else min(int(wanted), cases.size)
         whole = sum(piece.seconds for piece in self.pieces)
         return enough(cases.size, whole, lambda count: count * self.kind.audit_seconds * whole / cases.size)
+
+    def audited_of(self, dataset: xr.Dataset) -> int:
+        """The same once it is known what variants were computed with: none where one alone would take much longer than
+        all of them did."""
+        count, took = self.audited, self.kind.took(dataset)
+        asked = self.study.solver.audit != "auto"
+        dear = took is not None and took.again > max(MOST_TIMES * took.whole, PATIENCE)
+        return 0 if dear and not asked else count
 
     def place(self, where: Where) -> AbstractContextManager[Place]:
         """Threads."""

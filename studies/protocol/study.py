@@ -19,7 +19,7 @@ from results_schema.validate import validate
 from studies.protocol.checksum import VALUES, checksum_of_values
 from studies.protocol.library import by_name
 from studies.protocol.listener import NOBODY, Listener
-from studies.protocol.parts import Foreseen, TextTable, Variants, Work
+from studies.protocol.parts import Foreseen, TextTable, Took, Variants, Work
 from studies.protocol.store import Memory
 
 if TYPE_CHECKING:
@@ -167,6 +167,11 @@ class PiecedKind(Kind, ABC):
     def foreseen(self, study: Study, threads: int, audited: int) -> Foreseen | None:
         """What a run on so many threads will take, with an audit of some variants, as some seconds of it show; None
         where its pieces tell that."""
+        return None
+
+    def took(self, dataset: xr.Dataset) -> Took | None:
+        """What results took and what an audit would, by what variants were computed with; None where that is known
+        beforehand."""
         return None
 
     def again(self, study: Study, variants: Counts, work: Work) -> Mapping[int, tuple[Array, Array] | None]:

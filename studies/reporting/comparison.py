@@ -141,14 +141,16 @@ def _differences(first: Results, second: Results, names: list[tuple[Range, str]]
         # np.argmax takes a NaN, a number in one of them alone, for the largest
         most = np.argmax(np.where(beyond, apart - np.nan_to_num(allowed), 0.0) if beyond.any() else apart)
         place = tuple(map(int, np.unravel_index(int(most), apart.shape))) if apart.ndim else ()
-        values, extremes = (float(old[place]), float(new[place])), (_extreme(old), _extreme(new))
+        values = float(old[place]), float(new[place])
+        extremes = _extreme(found.name, old), _extreme(found.name, new)
         where, counts = first.at(place[: len(first.dims)]), (int(beyond.sum()), int(unknown.sum()))
         yield Difference(name, found.units, values, where, float(allowed[place]), *counts, extremes)
 
 
-def _extreme(values: Array) -> float:
-    """The value of largest size; NaN where there is none."""
-    return float(values.flat[np.argmax(np.where(np.isnan(values), -1.0, np.abs(values)))])
+def _extreme(name: str, values: Array) -> float:
+    """The value of largest size, of what ends in _min the smallest; NaN where there is none."""
+    size = -values if name.endswith("_min") else np.abs(values)
+    return float(values.flat[np.argmax(np.where(np.isnan(values), -np.inf, size))])
 
 
 def _of(results: Results, found: Range) -> xr.DataArray:

@@ -52,16 +52,16 @@ def audit_group(plan: Plan, dataset: xr.Dataset, work: Work) -> dict[str, xr.Dat
     return {GROUP: _group(plan.cases, dataset, found.variants, _of_plan(plan, dataset, found), left_out)}
 
 
-def audit_group_of_pieces(parts: Pieces, dataset: xr.Dataset, work: Work) -> dict[str, xr.Dataset]:
-    """The same of a study whose kind computes it in pieces."""
+def audit_group_of_pieces(parts: Pieces, dataset: xr.Dataset, count: int, work: Work) -> dict[str, xr.Dataset]:
+    """The same of a study whose kind computes it in pieces, of so many of its variants."""
     from engine.batch.audit import Audit, drawn
     from engine.scene.sweep import expand
     from engine.scene.variants import VariantValues
 
-    if not parts.audited:
+    if not count:
         return {}
     cases = expand(parts.study)
-    variants = drawn(cases.size, parts.audited)
+    variants = drawn(cases.size, count)
     kept = ~lost(_flat(cases, dataset["status"])[variants])
     each, place = dict[int, Errors | None](), work.place.apart
     own = np.array_split(variants[kept], min(place.slots, max(1, int(kept.sum()))))

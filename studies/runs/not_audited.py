@@ -35,11 +35,11 @@ def why_none(plan: Plan) -> dict[str, str]:
     return {WHY: NOTHING_FINER if sampled(plan).size else CHOSE}
 
 
-def why_none_of_pieces(parts: Pieces) -> dict[str, str]:
-    """The same of a study whose kind computes it in pieces."""
+def why_none_of_pieces(parts: Pieces, count: int) -> dict[str, str]:
+    """The same of a study whose kind computes it in pieces; count: of variants that were to be audited."""
     if parts.study.solver.audit == 0 or not parts.kind.audit_seconds:
         return {}
-    return {WHY: NOTHING_FINER if parts.audited else TOO_LONG}
+    return {WHY: NOTHING_FINER if count else TOO_LONG}
 
 
 def told_none(results: Results) -> str:

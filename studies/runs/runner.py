@@ -146,10 +146,11 @@ def _of_pieces(parts: Pieces, root: xr.Dataset, work: Work) -> Mapping[str, xr.D
     """The bodies of the scene without its sweep, and the audit."""
     from engine.batch.dataset import model_groups
 
-    if parts.audited:
+    count = parts.audited_of(root)
+    if count:
         work.listener.stage(AUDITING)
-    audit = audit_group_of_pieces(parts, root, work)
-    root.attrs.update({} if audit else why_none_of_pieces(parts))
+    audit = audit_group_of_pieces(parts, root, count, work)
+    root.attrs.update({} if audit else why_none_of_pieces(parts, count))
     return model_groups(base_scene(parts.study)) | audit
 
 

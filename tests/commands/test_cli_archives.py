@@ -83,10 +83,13 @@ def test_no_table_breaks_within_a_number_or_before_its_unit(here: Path, capsys: 
         values = (one.smallest.value, *one.percentiles, one.largest.value)
         assert one.is_constant or all(f" {one.value(value)}" in shown for value in values)
         assert one.is_constant or f"{one.name} {one.sensor}".strip() in shown.splitlines()
-    for found in comparison.compared(results, results_of(open_archive("other.nc"))).differences:
+    differences = comparison.compared(results, results_of(open_archive("other.nc"))).differences
+    for found in differences:
         assert all(quantity(value, found.units) in compared for value in (*found.values, *found.extremes))
     blocks = shown[shown.index("\ntrolley_contact_force_min\n") :].split("\n  ")
     lowest = float(results.dataset.trolley_contact_force_min.min())
+    [apart] = [one for one in differences if one.name == "trolley_contact_force_min"]
+    assert apart.extremes[0] == lowest
     [low] = [one for one in summary.in_tables(results) if one.name == "trolley_contact_force_min"]
     assert low.telling.value == lowest and blocks[2].startswith(f"smallest at speed {low.telling.words['speed']}")
     [high] = [one for one in summary.in_tables(results) if one.name == "midspan_max"]

@@ -132,9 +132,10 @@ def elastic_beam(body: Beam, frame: Frame, modes: int | None, where: str, hung: 
     dm, lateral_moment = body.mass_per_length * dx, frame.lateral_second_moment or body.second_moment
     polar = (body.second_moment + lateral_moment) / body.area
     modal: list[tuple[Part, Law]] = [_bending(body, count, Z)]
-    if frame.lateral_modes:
+    across = count if frame.lateral_modes is None else frame.lateral_modes
+    if across and frame.lateral_second_moment is not None:
         lateral = body.model_copy(update={"second_moment": frame.lateral_second_moment})
-        modal.append(_bending(lateral, frame.lateral_modes, Y))
+        modal.append(_bending(lateral, across, Y))
     if frame.axial_modes:
         modal.append(_bar(body, frame.axial_modes, X, body.mass, body.youngs_modulus * body.area))
     if frame.torsion_modes:

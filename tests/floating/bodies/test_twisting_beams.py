@@ -64,7 +64,8 @@ def arm(body: dict, frame: dict) -> Study:
 
 
 def test_a_beam_is_the_frame_of_one_member() -> None:
-    """A mass beside its axis twists it as it swings; without torsion modes that is missed by far."""
+    """A mass beside its axis twists it as it swings; without torsion modes that is missed by far. Across its loads it
+    bends by as many modes as along them."""
     section = MATERIAL | TWIST | {"second_moment_lateral": TWIST["lateral_second_moment"]}
     del section["lateral_second_moment"]
     member = {"nodes": ["root", "tip"], "section": "all", "elements": 24}
@@ -81,7 +82,7 @@ def test_a_beam_is_the_frame_of_one_member() -> None:
     ways = []
     for body, own in (
         (frame, {}),
-        (beam, TWIST | {"lateral_modes": 4, "axial_modes": 2, "torsion_modes": 3}),
+        (beam, TWIST | {"axial_modes": 2, "torsion_modes": 3}),
         (beam, TWIST | {"lateral_modes": 4, "axial_modes": 2}),
     ):
         model, marched = steps(arm(body, own), 0.4, 4000, 40, FOX_GOODWIN)

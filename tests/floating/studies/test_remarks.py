@@ -56,11 +56,11 @@ SAID = {
     "sensor low reads 0: its body has no displacement as it does not bend": with_tool(
         frame=HUNG, sensor={"low": {"body": "tool", "at": 0.5}}
     ),
-    "frame.arm.joints.0 turns arm across the plane in which it bends: lateral_modes of frame.arm, with its": driven(
+    "frame.arm.joints.0 turns arm across the plane in which it bends: a lateral_second_moment of frame.arm": driven(
         joints=[TURN | {"axis": [0, 0, 1]}]
     ),
     "frame.arm.joints.1 pushes arm across the plane in which it bends": driven(joints=[TURN, SLIDE]),
-    "sensor side reads 0: nothing that carries it moves or bends along y over the ground: lateral_modes of frame.arm": (
+    "sensor side reads 0: nothing that carries it moves or bends along y over the ground: a lateral_second_moment of": (
         driven(sensor={"side": ASIDE})
     ),
     'arm starts undeformed, so that weight sets it swinging at time 0; initial = "equilibrium"': heavy(),
@@ -85,7 +85,7 @@ def test_nothing_is_remarked_of_ordinary_studies() -> None:
     assert KIND.remarks(driven(sensor={"torque": {"body": "arm", "quantity": "drive_torque"}})) == ()
     assert KIND.remarks(with_tool(frame=HUNG)) == ()
     assert KIND.remarks(driven(sensor={"far": ASIDE | {"direction": "z"}})) == ()
-    bends = {"joints": [TURN], "lateral_modes": 1, "lateral_second_moment": 2e-7}
+    bends = {"joints": [TURN], "lateral_second_moment": 2e-7}
     assert KIND.remarks(driven(sensor={"side": ASIDE}, frame={"arm": bends})) == ()
     about_z = TURN | {"axis": [0, 0.1, 1]}
     assert KIND.remarks(driven(sensor={"side": ASIDE}, joints=[about_z, TURN])) == ()
