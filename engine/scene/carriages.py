@@ -33,7 +33,7 @@ class Carriage(SpecOfKind):
     """Base of all carriages.
 
     on: name of the body. delay: s after time 0 at which it sets off, 0 if not given.
-    headway: instead of a delay, the metres of its own way by which it trails a carriage that sets off at time 0.
+    headway: the metres of its own way by which it trails a carriage that sets off then.
     masses: keys that hold parts of its mass in kg; touching: of these, what touches the track; forces: keys in N.
     may_push: directions beside that of its loads in which its inertia may act.
     """
@@ -132,17 +132,12 @@ class Carriage(SpecOfKind):
     @property
     def start_time(self) -> float:
         """s after time 0 at which the carriage sets off."""
-        if self.headway is None:
-            return self.delay or 0.0
-        return self.headway * self.motion.time_scale / self.motion.max_speed
+        trails = 0.0 if self.headway is None else self.headway * self.motion.time_scale / self.motion.max_speed
+        return (self.delay or 0.0) + trails
 
     @model_validator(mode="after")
-    def _one_start(self) -> Carriage:
-        if self.headway is None:
-            return self
-        if self.delay is not None:
-            raise fault("a carriage has a delay or a headway, not both", expected="delay (s) or headway (m)")
-        if self.motion.pace != "speed":
+    def _told_start(self) -> Carriage:
+        if self.headway is not None and self.motion.pace != "speed":
             raise fault("a headway needs a motion with a constant speed", expected="delay (s)")
         return self
 

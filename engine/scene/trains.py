@@ -15,7 +15,7 @@ from engine.scene.motions.base import Motion
 from engine.study_file.document import Document
 from engine.study_file.refusals import refuse
 from engine.study_file.spec import LIST, NUMBER, KindOf, Noun, Spec, by_amount_form
-from engine.study_file.units import Damping, Dimensionless, Force, Length, Mass, Stiffness, fault
+from engine.study_file.units import Damping, Dimensionless, Force, Length, Mass, Stiffness, Time, fault
 from results_schema.arrays import Array
 
 MAX_AXLES = 200
@@ -37,7 +37,8 @@ class Train(Spec):
     """Base of all trains. Its axles are the carriages NAME_1 (in front), NAME_2 and so on.
 
     axles: how many, which a list of distances tells too. spacing: m from every axle to the next, or one for each,
-    from the front. spacing_scale, load_scale: factors of all distances, and of all forces and masses.
+    from the front. delay: s after time 0 at which the first axle sets off, 0 if not given. spacing_scale, load_scale:
+    factors of all distances, and of all forces and masses.
     loads, springs: keys of numbers that are the same for all axles, or listed for each from the front; the former are
     those that `load_scale` multiplies, in `units`. unsprung: that of the mass which moves with the body; "" for none.
     """
@@ -56,6 +57,7 @@ class Train(Spec):
     motion: Annotated[AnyMotion, AfterValidator(_in_a_row)]
     axles: int | None = Field(default=None, ge=1, le=MAX_AXLES)
     spacing: OneOrEach[Annotated[Length, Field(gt=0)]]
+    delay: Time | None = Field(default=None, ge=0)
     spacing_scale: Dimensionless = Field(default=1.0, gt=0)
     load_scale: Dimensionless = Field(default=1.0, gt=0)
 
@@ -103,8 +105,8 @@ class Train(Spec):
     def swept(self) -> str:
         """What of it may be swept, in words."""
         if self.motion.ends:
-            return "load_scale, a load or a number of the motion, but not where that begins and ends"
-        return "spacing (one for all), spacing_scale, load_scale, a load or a number of the motion"
+            return "delay, load_scale, a load or a number of the motion, but not where that begins and ends"
+        return "delay, spacing (one for all), spacing_scale, load_scale, a load or a number of the motion"
 
     @property
     def each(self) -> tuple[str, ...]:
@@ -123,6 +125,8 @@ class Train(Spec):
     def numbers(self, axle: int) -> dict[str, float]:
         """What an axle has of its own, counted from 0, by the keys of carriages."""
         found = {key: self.own(key)[axle] * self.scale(key) for key in self.each}
+        if self.delay is not None:
+            found["delay"] = self.delay
         trails = axle and not self.motion.ends
         return found | ({"headway": self.distances[axle] * self.spacing_scale} if trails else {})
 
@@ -148,7 +152,7 @@ class Train(Spec):
         elif key == "load_scale":
             each = ((axle, load, self.own(load)[axle]) for load in self.loads for axle in axles)
             yield from (number for number in each if number[-1])
-        elif first == "motion":
+        elif first in ("motion", "delay"):
             yield from ((axle, key, 1) for axle in axles)
         elif first in self.each:
             yield from ((axle, first, self.scale(first)) for axle in ([int(rest)] if rest else axles))

@@ -184,10 +184,10 @@ class VariantValues:
 
     def start_time(self, carriage: str) -> Array:
         """(V,) seconds after time 0 at which a carriage sets off."""
-        spec = self.study.carriage[carriage]
+        spec, delay = self.study.carriage[carriage], self.column(f"carriage.{carriage}.delay")
         if spec.headway is None:
-            return self.column(f"carriage.{carriage}.delay")
-        return self.column(f"carriage.{carriage}.headway") * self.time_scale(carriage) / spec.motion.max_speed
+            return delay
+        return delay + self.column(f"carriage.{carriage}.headway") * self.time_scale(carriage) / spec.motion.max_speed
 
     def timing(self) -> dict[str, tuple[Array, Array]]:
         """Per carriage pace and delay (V,) relative to the scene's time scale, rounded so that they group."""

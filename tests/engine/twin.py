@@ -172,9 +172,8 @@ def standing(at: float, start: float, end: float) -> Phase:
 
 def start_of(carriage: Any) -> float:
     """Seconds after time 0 at which a carriage sets off."""
-    if carriage.headway is not None:
-        return float(carriage.headway / carriage.motion.speed)
-    return float(carriage.delay or 0.0)
+    trails = 0.0 if carriage.headway is None else float(carriage.headway / carriage.motion.speed)
+    return float(carriage.delay or 0.0) + trails
 
 
 def load_of(study: Study, name: str, length: float, end: float, number: int = 0) -> Load:

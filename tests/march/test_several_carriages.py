@@ -49,7 +49,7 @@ SCENES: dict[str, Callable[[], Study]] = {
         {"t": TABLE, "u": UNEVEN},
     ),
     "a table behind a mass, on a bed that bends by itself": lambda: scene(
-        {"m": mass(0.2, cruise(-0.4, 1.4, 0.8)), "a": table("t", cruise(-0.4, 1.4, 0.8), headway=0.5)},
+        {"m": mass(0.2, cruise(-0.4, 1.4, 0.8)), "a": table("t", cruise(-0.4, 1.4, 0.8), headway=0.3, delay=0.25)},
         {"t": TABLE},
         beam(own_weight=True, modes=3),
     ),

@@ -170,7 +170,6 @@ def test_numbers_and_units() -> None:
         ("times = [0.0, 1.0, 3.0]", "times = [0.0, 3.0, 3.0]", ["times", "ascend"]),
         ("times = [0.0, 1.0, 3.0]", "times = [1.0, 2.0, 3.0]", ["times.0", "0"]),
         ("times = [0.0, 1.0, 3.0]", "times = [0.0, 3.0]", ["2 times, 3 positions"]),
-        ("headway = 2.0", "headway = 2.0\ndelay = 1.0", ["carriage.load", "not both"]),
         ("[sensor.midspan]", '[sensor."mid span"]', ["sensor.mid span", "name"]),
         ("[sensor.midspan]", "[sensor.status]", ["status", "reserved"]),
         ("speed = {", "table_contact_force_min = {", ["sweep.table_contact_force_min", "result"]),

@@ -19,7 +19,7 @@ from studies.reporting.summary import in_tables
 from studies.results.findings_common import told_trains
 from studies.results.formatting import number
 from studies.results.results import Results
-from tests.engine.build import aboard, beam, cruise, force, mass, oscillator, study, under
+from tests.engine.build import aboard, beam, cruise, fixed, force, mass, oscillator, study, under
 
 WAY = cruise(0.0, 1.0, 0.8)
 TEXT = """\
@@ -128,6 +128,20 @@ def test_swept_spacings_are_those_of_carriages(spacing: float) -> None:
     assert all(float(found[name].sel(spacing=spacing)) == float(alone[name]) for name in exact)
 
 
+@pytest.mark.parametrize("delay", [0.0, 0.4, 1.1])
+def test_a_train_that_sets_off_later_starts_further_back(delay: float) -> None:
+    """Against another one; both from a start as far behind as it would go meanwhile, to what is told of errors."""
+    lead, late = {"lead": mass(0.3, WAY)}, mass(0.2, cruise(1.0, 0.0, 0.5)) | REGULAR
+    sensor, swept = {"middle": fixed(0.5)}, {"delay": {"of": "train.tram.delay", "values": [0.0, 0.4, 1.1]}}
+    found = studies.run(study(beam(), lead, train={"tram": late}, sensor=sensor, sweep=swept)).sel(delay=delay)
+    behind = late | {"motion": cruise(1.0 + 0.5 * delay, 0.0, 0.5)}
+    alone = studies.run(study(beam(), lead, train={"tram": behind}, sensor=sensor))
+    for name in ("middle_max", "middle_min", "tram_2_contact_force_max"):
+        told = [float(one["estimated_error"].sel(result=name)) for one in (found, alone)]
+        scale = max(abs(float(alone["middle_max"])), abs(float(alone[name])))
+        assert float(found[name]) == pytest.approx(float(alone[name]), abs=scale * sum(told) + 1e-9)
+
+
 def test_lists_of_sprung_masses_and_their_scales() -> None:
     lists = {"mass": [0.2, 0.1], "wheel_mass": 0.05, "spacing": [0.25], "load_scale": 2.0, "spacing_scale": 2.0}
     table = {key: value for key, value in oscillator(1.0, 40.0, WAY).items() if key != "mass"} | lists
@@ -144,6 +158,7 @@ def test_lists_of_sprung_masses_and_their_scales() -> None:
         ("mass.1", {"tram_2.mass": 5.0}),
         ("stiffness", {f"tram_{n}.stiffness": 1.0 for n in (1, 2, 3)}),
         ("motion.start", {f"tram_{n}.motion.start": 1 for n in (1, 2, 3)}),
+        ("delay", {f"tram_{n}.delay": 1 for n in (1, 2, 3)}),
         ("axles", {}),
         ("spacing.0", {}),
     ],
