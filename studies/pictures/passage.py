@@ -64,10 +64,11 @@ def pictures(results: Results) -> list[Figure]:
                 continue
             asked = not first or limit is not None
             (first if asked else others).append(_sizes(results, own, limit))
-        if seen.y is not None and len(seen.y.values) > MANY and _is_telling(seen, gain(results, sensors[0])):
-            first.append(_map(seen, sensors[0]))
-        else:
+        many = seen.y is not None and len(seen.y.values) > MANY
+        telling = many and _is_telling(seen, gain(results, sensors[0]))
+        if not telling or _amplified_elsewhere(results, sensors[0], top):
             first += _map_of_sizes(results, sensors[0], limits)
+        first += [_map(seen, sensors[0])] if telling else []
         touching = [name for name in results.study.carriage if _has_contact(seen, name)]
         first += [_contact(seen, touching)] if touching else []
     size = np.where(results.with_values, sizes(results, sensors[0]), np.nan)
@@ -111,6 +112,11 @@ def _varies(seen: View, values: Any) -> bool:
     known = seen.plane(values)
     known = known[np.isfinite(known)]
     return bool(known.size and np.ptp(known) > FLAT)
+
+
+def _amplified_elsewhere(results: Results, sensor: str, top: Index) -> bool:
+    """Whether another variant than the one with the largest value of a sensor is amplified most."""
+    return largest(results, gain(results, sensor).values) != top
 
 
 def _is_telling(seen: View, values: Any) -> bool:

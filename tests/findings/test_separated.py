@@ -92,6 +92,18 @@ def test_a_map_of_amplifications_says_of_which_cells_its_title_is() -> None:
         assert figure.title.endswith(title) and ("the map goes on beyond" in figure.caption) == lost
 
 
+def test_values_have_a_map_of_their_own_where_another_variant_is_amplified_most() -> None:
+    """So that nobody takes what is amplified most, from little, for what is largest."""
+    mass = 'mass = { of = "carriage.table.mass", from = 100, to = 800, count = 7 }'
+    speed = 'speed = { of = "carriage.table.motion.speed", from = 1, to = 12, count = 7 }'
+    dataset = scenes.run("passage", f"{speed}\n{mass}")
+    size = np.maximum(np.abs(dataset["midspan_max"]), np.abs(dataset["midspan_min"])).values
+    for grows in (1.0, -1.0):
+        dataset["dynamic_amplification"].values[:] = 2.0 + grows * (size / size.max())[..., None]
+        names = [figure.name for figure in answers.figures(dataset)]
+        assert "amplification-map" in names and ("largest-displacement-map" in names) == (grows < 0.0)
+
+
 def test_double_peaks_count_while_the_contact_holds() -> None:
     """In sentences, titles, and in what is audited."""
     dataset = opened("double-peak", dynamic_amplification=9.0, odd_even_ratio=5.0)

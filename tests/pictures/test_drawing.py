@@ -63,7 +63,7 @@ def test_every_study_is_drawn(name: str, tmp_path: Path) -> None:
     text = page.read_text(encoding="utf-8")
     reader = check_standing_alone(text)
     shown = reader.text.partition("schema_version")[0].replace(MINUS, "-")
-    for part in base_scene(found).bodies:
+    for part in (one for one in base_scene(found).bodies if one.modal.omega.any() or one.name not in found.frame):
         rest = shown.partition(f"Mode shapes of {part.name}")[2]
         for mode, omega in enumerate(part.modal.omega[:FREQUENCIES_SHOWN], start=1):
             assert f"mode {mode}: {number(omega / (2.0 * np.pi))} Hz" in rest
