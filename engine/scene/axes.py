@@ -133,7 +133,8 @@ def check_targets(study: Study, name: str, axis: SweepAxis) -> None:
             remedy = nearest(longer[0], longer) if longer else nearest(path, known)
             if several := fnmatch.filter(known, path) if "*" in path else []:
                 remedy = f"name each of them: of = {json.dumps(several[:3])}{' and so on' * (len(several) > 3)}"
-            remedy = _of_list(study, path) or remedy or _without_its_table(study, path)
+            remedy = _of_list(study, path) or _without_its_motion(study, path) or remedy
+            remedy = remedy or _without_its_table(study, path)
             what = "no such number"
             raise study.source.fault(
                 here, what, expected="the key of a number", received=shortened(path), remedy=remedy
@@ -149,6 +150,16 @@ def check_targets(study: Study, name: str, axis: SweepAxis) -> None:
                 received=shortened(path),
                 remedy="a study file for each",
             )
+
+
+def _without_its_motion(study: Study, path: str) -> str:
+    """That what would move has no motion, such as a joint; "" where it has, or is not there itself."""
+    owner, _, rest = path.partition(".motion.")
+    there: Any = study.tables
+    for key in owner.split("."):
+        listed = isinstance(there, list) and key.isdigit() and int(key) < len(there)
+        there = there[int(key)] if listed else there.get(key) if isinstance(there, dict) else None
+    return f"is {owner}.motion missing?" if rest and isinstance(there, dict) and "motion" not in there else ""
 
 
 def _without_its_table(study: Study, path: str) -> str:

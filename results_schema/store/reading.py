@@ -119,7 +119,8 @@ def _check_schema(path: Path, dataset: Any) -> None:
     version = getattr(dataset, "schema_version", None)
     if not isinstance(version, int | np.integer) or not isinstance(getattr(dataset, "study_kind", None), str):
         expected, received = "attributes schema_version and study_kind", ", ".join(dataset.ncattrs()) or "no attributes"
-        raise ArchiveError("a netCDF file of another program", where=str(path), expected=expected, received=received)
+        what, remedy = "a netCDF file of another program", "of a dataset studies.write(dataset, path) makes an archive"
+        raise ArchiveError(what, where=str(path), expected=expected, received=received, remedy=remedy)
     if version > SCHEMA_VERSION:
         what, expected = "written by a newer version", f"schema_version up to {SCHEMA_VERSION}"
         raise ArchiveError(what, where=str(path), expected=expected, received=str(version), remedy="update wanderlast")

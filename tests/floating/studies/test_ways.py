@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import studies
+from engine.scene.sweep import expand
 from results_schema.errors import BadInput
 from results_schema.status import Status
 from studies.kinds.moving_frames import KIND
@@ -76,3 +77,10 @@ def test_places_do_not_pass_beyond_a_sudden_stop() -> None:
     """By parabolas through stations before and after it the trolley came 0.4 mm further."""
     found = studies.run(driven({"end": 10.0, "speed": 11.0}))
     assert float(found["trolley_position_max"]) == pytest.approx(10.0, abs=1e-12)
+
+
+def test_who_sweeps_the_motion_of_a_joint_that_has_none_is_told() -> None:
+    swept = {"time": {"of": "frame.arm.joints.0.motion.times.1", "values": [1.0]}}
+    loose = driven(joints=[{"kind": "revolute", "axis": [0, 1, 0]}], sweep=swept)
+    with pytest.raises(BadInput, match=r"no such number.*is frame\.arm\.joints\.0\.motion missing\?"):
+        expand(loose)
