@@ -13,7 +13,7 @@ from studies.findings.amplification import largest, sizes
 from studies.findings.beyond import limits_of, of_every_quantity, ranked
 from studies.findings.effects import unchanged
 from studies.moving.findings import along_way
-from studies.pictures.common.figures import Figure, draw, legend_of_all, on_method, shades
+from studies.pictures.common.figures import Figure, draw, legend_of_all, limit_line, on_method, shades, telling_limits
 from studies.pictures.common.sizes import sizes_of
 from studies.pictures.common.sweep_view import View, along_axis, draw_curves, one_legend, view
 from studies.pictures.trajectory import histories, ranging
@@ -31,7 +31,7 @@ def pictures(results: Results) -> list[Figure]:
     traced = results.traced()
     if not traced:
         return []
-    shown, own = list(chosen(traced, MOST_CURVES)), [_own(results, traced)]
+    shown, own = list(chosen(traced, MOST_CURVES)), [_top(results, traced)]
     rows, over_time = _rows(results), list[Figure]()
     caption = f"At {results.at(own[0])}; one of {len(traced)} kept histories." if len(traced) > 1 else ""
     if rows:
@@ -62,10 +62,10 @@ def _over_sweep(results: Results) -> Iterator[Figure]:
         seen = view(results, at=top)
         if seen.x is not None and not all(unchanged(results, sizes(results, name)) for name in own):
             limit = limits.of(results.study.sensor[own[0]])
-            yield _of_tips(seen, tips, top) if tips else sizes_of(seen, own, limit, top)
+            yield telling_limits(_of_tips(seen, tips, limit, top)) if tips else sizes_of(seen, own, limit, top)
 
 
-def _of_tips(seen: View, tips: list[str], top: Index) -> Figure:
+def _of_tips(seen: View, tips: list[str], limit: float | None, top: Index) -> Figure:
     """How far tips are from where the rigid arm would have them, at all and after the stop; top: where most."""
     results = seen.results
     most = f"{quantity(float(sizes(results, tips[0])[top]), 'm')},{in_words(results, top)}"
@@ -75,10 +75,10 @@ def _of_tips(seen: View, tips: list[str], top: Index) -> Figure:
         f"{counted(len(tips) - MOST_TIPS, 'more sensor')} in the archive." if len(tips) > MOST_TIPS else "",
     )
     shown = tips[:MOST_TIPS]
-    return draw("position-errors", title, caption, 0.9 + 2.1 * len(shown), partial(_draw_tips, seen, shown))
+    return draw("position-errors", title, caption, 0.9 + 2.1 * len(shown), partial(_draw_tips, seen, shown, limit))
 
 
-def _draw_tips(seen: View, tips: list[str], drawing: Drawing) -> None:
+def _draw_tips(seen: View, tips: list[str], limit: float | None, drawing: Drawing) -> None:
     stops = any(np.isfinite(sizes(seen.results, f"{tip}{AFTER_STOP}")).any() for tip in tips)
     columns = [("", "in the whole time"), (AFTER_STOP, "after the stop")][: 1 + stops]
     grid = drawing.subplots(len(tips), len(columns), squeeze=False, sharex=True, sharey="row")
@@ -89,11 +89,20 @@ def _draw_tips(seen: View, tips: list[str], drawing: Drawing) -> None:
             draw_curves(axes, seen, seen.curves(values))
             axes.set_title(f"{tip.replace('_', ' ')}{along_way(seen.results, tip)} {when}")
             axes.set_ylim(0.0, None)
+            if limit is not None and limit * scale.factor <= axes.get_ylim()[1]:
+                limit_line(axes, limit * scale.factor, f"limit {quantity(limit, 'm')}" * (axes is row[0]), "left")
         row[0].set_ylabel(seen.results.label(tip, scale.unit, "largest"))
     one_legend([axes for row in grid for axes in row[::-1]])
     for axes in grid[-1]:
         along_axis(axes, seen)
     drawing.align_ylabels()
+
+
+def _top(results: Results, traced: list[Index]) -> Index:
+    """The variant that the answer begins with, if its history is kept, else `_own`."""
+    told = ranked(results, limits_of(results.study))[:1]
+    top = largest(results, sizes(results, told[0])) if told else None
+    return top if top in traced else _own(results, traced)
 
 
 def _own(results: Results, traced: list[Index]) -> Index:

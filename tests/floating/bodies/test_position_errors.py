@@ -13,6 +13,7 @@ from results_schema.errors import BadInput
 from results_schema.status import Status
 from studies.findings.absolute_errors import absolute_errors
 from studies.kinds.moving_frames import KIND
+from studies.pictures.moving_frames import pictures
 from studies.protocol.study import kind_of
 from studies.results.formatting import quantity
 from studies.results.results import Results
@@ -245,6 +246,8 @@ def test_a_limit_of_position_errors_is_told(coarse: xr.Dataset) -> None:
         given = Results.of(coarse).study.with_values({"question.position_error": limit})
         said = next(one for one in kind_of(given).findings(Results(coarse, given)) if one.startswith("tip: "))
         assert "Its absolute value exceeds" in said and expected in said
+        (drawn,) = (one for one in pictures(Results(coarse, given)) if one.name == "position-errors")
+        assert ("Orange: limits that the study names." in drawn.caption) == (expected == "exceeds")
 
 
 def test_the_figure_has_both_panels(coarse: xr.Dataset) -> None:
