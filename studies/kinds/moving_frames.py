@@ -3,35 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Annotated
 
 import numpy as np
-from pydantic import Field
 
 from engine.scene.study import Study
-from engine.study_file.units import Force, Length, Time, Torque
 from results_schema.arrays import Array, Counts
 from results_schema.lazy_imports import xr
 from results_schema.variables import declare
-from studies.findings.beyond import Limits
 from studies.moving import findings
 from studies.moving.parts import AUDIT_SECONDS, gather
+from studies.moving.question import Question, check_residual
 from studies.moving.variables import RESULTS
 from studies.protocol.parts import Foreseen, Piece, TextTable, Took, Work
 from studies.protocol.study import PiecedKind, question_of
 from studies.results.results import Results
 
 declare("moving-frames", *RESULTS)
-
-
-class Question(Limits):
-    """The table [question]. duration: s, of the march. The limits: of absolute values, of which is told for every
-    sensor of that quantity from which swept value on they are exceeded."""
-
-    duration: Time = Field(gt=0)
-    position_error: Annotated[Length, Field(gt=0)] | None = None
-    drive_torque: Annotated[Torque, Field(gt=0)] | None = None
-    drive_force: Annotated[Force, Field(gt=0)] | None = None
 
 
 def _duration(study: Study) -> Callable[[Mapping[str, Array], int], Array]:
@@ -60,6 +47,7 @@ class MovingFrames(PiecedKind):
             raise fault("body", "there is no body", expected="a table [body.NAME]")
         if study.solver.fidelity not in ("auto", "full"):
             raise fault("solver.fidelity", "frames that move have no such model", expected='"auto" or "full"')
+        check_residual(study, question_of(study, Question))
         if study.output.histories not in ("auto", "all", "none"):
             what = "histories of frames that move are kept at some 800 times"
             raise fault("output.histories", what, expected='"auto", "all" variants or "none"')

@@ -4,8 +4,9 @@ import numpy as np
 
 from engine.scene.study import Study
 from results_schema.variables import declare
-from studies.kinds.moving_frames import MovingFrames, Question
+from studies.kinds.moving_frames import MovingFrames
 from studies.moving import findings
+from studies.moving.question import Question
 from studies.moving.variables import RESULTS
 from studies.protocol.study import question_of
 from studies.results.formatting import quantity

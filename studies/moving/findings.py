@@ -9,6 +9,8 @@ from studies.findings.absolute_errors import errors_of_size
 from studies.findings.amplification import sizes
 from studies.findings.beyond import limits_of, ranked, told_limit
 from studies.findings.effects import by_effect, told_effects
+from studies.moving.question import Question
+from studies.protocol.study import question_of
 from studies.results.findings_common import in_words, over_all, told_statuses, uncertainty, while_held
 from studies.results.formatting import counted, quantity
 from studies.results.places import extreme
@@ -112,7 +114,17 @@ def _position_error(results: Results, sensor: str, beyond: str) -> Iterator[str]
     what = f"{while_held(results)}the largest position error {where}"
     yield f"{sensor}: {what}, from where the rigid arm would have it, is {most}.{beyond}"
     if after:
-        yield f"After the stop it is still up to {after}."
+        yield f"After the stop it is still up to {after}.{_beyond_after(results, sensor)}"
+
+
+def _beyond_after(results: Results, sensor: str) -> str:
+    """Where a position error after the stop is beyond its limit, behind another sentence; "" without one."""
+    limit, stop = question_of(results.study, Question).residual.position_error, f"{sensor}{AFTER_STOP}"
+    if limit is None:
+        return ""
+    values = sizes(results, stop)
+    axis = next(iter(by_effect(results, values)), None)
+    return told_limit(results, values, limit, results.sensors[sensor], axis, errors_of_size(results, stop))
 
 
 def along_way(results: Results, sensor: str) -> str:

@@ -13,15 +13,18 @@ from studies.findings.amplification import largest, sizes
 from studies.findings.beyond import limits_of, of_every_quantity, ranked
 from studies.findings.effects import unchanged
 from studies.moving.findings import along_way
+from studies.moving.question import Question
 from studies.pictures.common.figures import Figure, draw, legend_of_all, limit_line, on_method, shades, telling_limits
 from studies.pictures.common.sizes import sizes_of
 from studies.pictures.common.sweep_view import View, along_axis, draw_curves, one_legend, view
 from studies.pictures.trajectory import histories, ranging
+from studies.protocol.study import question_of
 from studies.results.findings_common import in_words
 from studies.results.formatting import ALIKE, counted, quantity, scale_for
 from studies.results.places import Index, chosen
 from studies.results.results import Results
 
+Limited = tuple[float | None, float | None]  # in the whole time, and after the stop
 MOST_ROWS, MOST_CURVES, MOST_TIPS = 5, 4, 3
 
 
@@ -62,10 +65,11 @@ def _over_sweep(results: Results) -> Iterator[Figure]:
         seen = view(results, at=top)
         if seen.x is not None and not all(unchanged(results, sizes(results, name)) for name in own):
             limit = limits.of(results.study.sensor[own[0]])
-            yield telling_limits(_of_tips(seen, tips, limit, top)) if tips else sizes_of(seen, own, limit, top)
+            limits_of_tips = limit, question_of(results.study, Question).residual.position_error
+            yield telling_limits(_of_tips(seen, tips, limits_of_tips, top)) if tips else sizes_of(seen, own, limit, top)
 
 
-def _of_tips(seen: View, tips: list[str], limit: float | None, top: Index) -> Figure:
+def _of_tips(seen: View, tips: list[str], limits: Limited, top: Index) -> Figure:
     """How far tips are from where the rigid arm would have them, at all and after the stop; top: where most."""
     results = seen.results
     most = f"{quantity(float(sizes(results, tips[0])[top]), 'm')},{in_words(results, top)}"
@@ -75,22 +79,22 @@ def _of_tips(seen: View, tips: list[str], limit: float | None, top: Index) -> Fi
         f"{counted(len(tips) - MOST_TIPS, 'more sensor')} in the archive." if len(tips) > MOST_TIPS else "",
     )
     shown = tips[:MOST_TIPS]
-    return draw("position-errors", title, caption, 0.9 + 2.1 * len(shown), partial(_draw_tips, seen, shown, limit))
+    return draw("position-errors", title, caption, 0.9 + 2.1 * len(shown), partial(_draw_tips, seen, shown, limits))
 
 
-def _draw_tips(seen: View, tips: list[str], limit: float | None, drawing: Drawing) -> None:
+def _draw_tips(seen: View, tips: list[str], limits: Limited, drawing: Drawing) -> None:
     stops = any(np.isfinite(sizes(seen.results, f"{tip}{AFTER_STOP}")).any() for tip in tips)
     columns = [("", "in the whole time"), (AFTER_STOP, "after the stop")][: 1 + stops]
     grid = drawing.subplots(len(tips), len(columns), squeeze=False, sharex=True, sharey="row")
     for row, tip in zip(grid, tips, strict=True):
         scale = scale_for(float(np.nanmax(sizes(seen.results, tip))), "m")
-        for axes, (end, when) in zip(row, columns, strict=True):
+        for axes, (end, when), limit in zip(row, columns, limits, strict=False):
             values = seen.results.dataset["status"].copy(data=sizes(seen.results, f"{tip}{end}") * scale.factor)
             draw_curves(axes, seen, seen.curves(values))
             axes.set_title(f"{tip.replace('_', ' ')}{along_way(seen.results, tip)} {when}")
             axes.set_ylim(0.0, None)
             if limit is not None and limit * scale.factor <= axes.get_ylim()[1]:
-                limit_line(axes, limit * scale.factor, f"limit {quantity(limit, 'm')}" * (axes is row[0]), "left")
+                limit_line(axes, limit * scale.factor, f"limit {quantity(limit, 'm')}", "left")
         row[0].set_ylabel(seen.results.label(tip, scale.unit, "largest"))
     one_legend([axes for row in grid for axes in row[::-1]])
     for axes in grid[-1]:

@@ -70,7 +70,7 @@ def test_tips_that_are_said_to_be_in_the_archive_alone_are_not_drawn() -> None:
     top = largest(results, sizes(results, "tip_6"))
     assert top is not None
     tips = list(sensors)[::-1]
-    figure = _of_tips(view(results, at=top), tips, None, top)
+    figure = _of_tips(view(results, at=top), tips, (None, None), top)
     assert len(figure.drawing.axes) == MOST_TIPS and "2 more sensors in the archive." in figure.caption
-    figure = _of_tips(view(results, at=top), tips[:3], None, top)
+    figure = _of_tips(view(results, at=top), tips[:3], (None, None), top)
     assert len(figure.drawing.axes) == MOST_TIPS and "more sensor" not in figure.caption

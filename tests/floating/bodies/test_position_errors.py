@@ -13,8 +13,9 @@ from results_schema.errors import BadInput
 from results_schema.status import Status
 from studies.findings.absolute_errors import absolute_errors
 from studies.kinds.moving_frames import KIND
+from studies.pictures.common.figures import LIMIT
 from studies.pictures.moving_frames import pictures
-from studies.protocol.study import kind_of
+from studies.protocol.study import kind_named, kind_of
 from studies.results.formatting import quantity
 from studies.results.results import Results
 
@@ -248,6 +249,24 @@ def test_a_limit_of_position_errors_is_told(coarse: xr.Dataset) -> None:
         assert "Its absolute value exceeds" in said and expected in said
         (drawn,) = (one for one in pictures(Results(coarse, given)) if one.name == "position-errors")
         assert ("Orange: limits that the study names." in drawn.caption) == (expected == "exceeds")
+
+
+def test_a_limit_after_the_stop_is_told_behind_it(coarse: xr.Dataset) -> None:
+    most = float(np.maximum(coarse["tip_after_stop_max"], -coarse["tip_after_stop_min"]).max())
+    for limit, expected in ((0.5 * most, "exceeds"), (2.0 * most, "nowhere")):
+        given = Results.of(coarse).study.with_values({"question.residual": {"position_error": limit}})
+        said = next(one for one in kind_of(given).findings(Results(coarse, given)) if one.startswith("After the stop"))
+        assert "Its absolute value exceeds" in said and expected in said
+        (drawn,) = (one for one in pictures(Results(coarse, given)) if one.name == "position-errors")
+        lines = [line.get_label() == LIMIT for axes in drawn.drawing.axes for line in axes.get_lines()]
+        assert any(lines) == (expected == "exceeds")
+
+
+def test_a_limit_after_the_stop_that_no_sensor_reads_is_refused() -> None:
+    question = {"duration": 0.2, "residual": {"position_error": 1e-3}}
+    frames = {"upper": {"joints": [HINGE | {"motion": {"kind": "steady", "rate": 0.1}}]}}
+    with pytest.raises(BadInput, match=r"question\.residual\.position_error: .* no sensor reads"):
+        kind_named("moving-frames").check(arm({"upper": LINK}, frames, question=question))
 
 
 def test_the_figure_has_both_panels(coarse: xr.Dataset) -> None:

@@ -1,0 +1,39 @@
+"""What studies of bodies in moving frames are asked: the table [question]."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from engine.scene.study import Study
+from engine.study_file.spec import Spec
+from engine.study_file.units import Force, Length, Time, Torque
+from studies.findings.beyond import Limits
+
+
+class AfterStop(Spec):
+    """Limits of readings from then on where all joints that carry a place have come to their ends."""
+
+    position_error: Annotated[Length, Field(gt=0)] | None = None
+
+
+class Question(Limits):
+    """The table [question]. duration: s, of the march. The limits: of absolute values, of which is told for every
+    sensor of that quantity from which swept value on they are exceeded; residual: of those after the stop."""
+
+    duration: Time = Field(gt=0)
+    position_error: Annotated[Length, Field(gt=0)] | None = None
+    drive_torque: Annotated[Torque, Field(gt=0)] | None = None
+    drive_force: Annotated[Force, Field(gt=0)] | None = None
+    residual: AfterStop = AfterStop()
+
+
+def check_residual(study: Study, asked: Question) -> None:
+    """Refuse limits of what nothing reads. Raises BadInput."""
+    if asked.residual.position_error is not None and not any(one.reads.of_arm for one in study.sensor.values()):
+        raise study.source.fault(
+            "question.residual.position_error",
+            "a limit of position errors, which no sensor reads",
+            expected='a sensor with quantity = "position_error"',
+        )
