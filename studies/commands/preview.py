@@ -123,7 +123,7 @@ def _of_pieces(parts: Pieces, threads: int, compiled: float = 0.0) -> Preview:
     )
     cost = _measured(seen, around, threads) if seen else _expected(parts, around + sum(each.values()), threads)
     if kind.audit_seconds:
-        cost += _audited(parts.audited, study.solver.audit)
+        cost += _audited(seen.audited if seen else parts.audited, study.solver.audit)
     remarks = [*parts.remarks, *([seen.remark] if seen and seen.remark else [])]
     return Preview(tuple(table for table in tables if table.rows), cost, tuple(remarks))
 

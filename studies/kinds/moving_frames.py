@@ -68,9 +68,9 @@ class MovingFrames(PiecedKind):
         return again(study, _duration(study), variants, work)
 
     def took(self, dataset: xr.Dataset) -> Took:
-        from studies.moving.parts import took
+        from studies.moving.parts import seconds_of_marches
 
-        return took(dataset)
+        return seconds_of_marches(dataset["modes_used"].values, dataset["steps_used"].values)
 
     def foreseen(self, study: Study, threads: int, audited: int) -> Foreseen:
         from studies.moving.preview import foreseen

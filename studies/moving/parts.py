@@ -166,13 +166,12 @@ def _march(
     return unlabelled({name: array for name, array in whole.items() if array.size})  # none may have a history
 
 
-def took(dataset: xr.Dataset) -> Took:
-    """Seconds, about, of the marches that gave results, and of one audited variant, alone in its lanes: the same once
-    more, and a level beyond with more modes."""
+def seconds_of_marches(modes: Counts, steps: Counts) -> Took:
+    """Seconds, about, of the marches of variants with so many modes and steps, and of one audited variant, alone in its
+    lanes: the same once more, and a level beyond with more modes."""
     from engine.floating.converge import MORE_MODES
     from engine.kernels.layout import LANES
 
-    modes, steps = (dataset[name].values.astype(np.float64) for name in ("modes_used", "steps_used"))
     each = LEVELS_TAKEN / 2.0 * steps * (STEP_SECONDS + COORDINATE_SECONDS * modes)
     beyond = 2.0 * steps * (STEP_SECONDS + COORDINATE_SECONDS * MORE_MODES * modes)
     return Took(float(max(each.sum(), LANES * each.max())), LANES * float((each + beyond).max()))

@@ -10,7 +10,7 @@ import numpy as np
 from engine.kernels.compiling import clock_without_compiling
 from engine.march.stepper import Halted
 from results_schema.status import Status, label
-from studies.moving.parts import AUDIT_SECONDS, again, pieces, scenes
+from studies.moving.parts import AUDIT_SECONDS, again, pieces, scenes, seconds_of_marches
 from studies.protocol.parts import Foreseen, Piece, TextTable, Work, unlabelled
 from studies.protocol.stopping import AskedElsewhere
 from studies.results.formatting import counted, listed, number, scientific, spanned
@@ -47,9 +47,9 @@ def foreseen(
         begun = clock()
         found = _computed(everything, threads, clock)
         took = clock() - begun
+        audited = 0 if study.solver.audit == "auto" and _audits_are_too_dear(everything, found) else audited
         each = _audit(study, duration, own[0], threads, clock) if found and audited and took < ENOUGH else None
-    known = [everything[number] for number in found] or everything[:1]
-    share = sum(piece.seconds for piece in known) / sum(piece.seconds for piece in everything)
+    share = _share(everything, found)
     seconds = (took if found else UNFINISHED * took) / share
     if audited:
         at_once = np.ceil(min(audited, len(own)) / threads)
@@ -58,7 +58,22 @@ def foreseen(
     title = f"What {counted(len(found), 'piece')} of {len(everything):,} took, as in a run"
     rows = [_row(part, _held(study)) for part in found.values()]
     size = sum(part.nbytes for part in found.values()) / share
-    return Foreseen(study, TextTable(title, HEADINGS, rows), float(seconds), int(size), less)
+    return Foreseen(study, TextTable(title, HEADINGS, rows), float(seconds), int(size), audited, less)
+
+
+def _share(everything: Sequence[Piece], found: Mapping[int, xr.Dataset]) -> float:
+    """The part of all pieces that some of them are; of the first where there are none."""
+    known = [everything[number] for number in found] or everything[:1]
+    return sum(piece.seconds for piece in known) / sum(piece.seconds for piece in everything)
+
+
+def _audits_are_too_dear(everything: Sequence[Piece], found: Mapping[int, xr.Dataset]) -> bool:
+    """Whether a run audits nothing, by what the variants of some pieces were computed with."""
+    if not found:
+        return False
+    used = (np.concatenate([part[name].values for part in found.values()]) for name in ("modes_used", "steps_used"))
+    some = seconds_of_marches(*used)
+    return some._replace(whole=some.whole / _share(everything, found)).too_dear
 
 
 def _compile(scene: Scene) -> None:

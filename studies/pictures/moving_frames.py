@@ -34,7 +34,7 @@ def pictures(results: Results) -> list[Figure]:
     traced = results.traced()
     if not traced:
         return []
-    shown, own = list(chosen(traced, MOST_CURVES)), [_top(results, traced)]
+    shown, own = list(chosen(traced, MOST_CURVES)), [_of_answer(results, traced)]
     rows, over_time = _rows(results), list[Figure]()
     caption = f"At {results.at(own[0])}; one of {len(traced)} kept histories." if len(traced) > 1 else ""
     if rows:
@@ -88,7 +88,7 @@ def _draw_tips(seen: View, tips: list[str], limits: Limited, drawing: Drawing) -
     grid = drawing.subplots(len(tips), len(columns), squeeze=False, sharex=True, sharey="row")
     for row, tip in zip(grid, tips, strict=True):
         scale = scale_for(float(np.nanmax(sizes(seen.results, tip))), "m")
-        for axes, (end, when), limit in zip(row, columns, limits, strict=False):
+        for axes, (end, when), limit in zip(row, columns, limits[: len(columns)], strict=True):
             values = seen.results.dataset["status"].copy(data=sizes(seen.results, f"{tip}{end}") * scale.factor)
             draw_curves(axes, seen, seen.curves(values))
             axes.set_title(f"{tip.replace('_', ' ')}{along_way(seen.results, tip)} {when}")
@@ -102,7 +102,7 @@ def _draw_tips(seen: View, tips: list[str], limits: Limited, drawing: Drawing) -
     drawing.align_ylabels()
 
 
-def _top(results: Results, traced: list[Index]) -> Index:
+def _of_answer(results: Results, traced: list[Index]) -> Index:
     """The variant that the answer begins with, if its history is kept, else `_own`."""
     told = ranked(results, limits_of(results.study))[:1]
     top = largest(results, sizes(results, told[0])) if told else None

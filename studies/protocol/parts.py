@@ -255,12 +255,14 @@ class TextTable(NamedTuple):
 
 class Foreseen(NamedTuple):
     """What a run in pieces will take. study: with what it leaves open as it was found; table: what some variants were
-    computed with; seconds: of all pieces and the audit; bytes: of the archive. remark: what is not known, or ""."""
+    computed with; seconds: of all pieces and the audit, of so many variants; bytes: of the archive. remark: what is not
+    known, or ""."""
 
     study: Study
     table: TextTable
     seconds: float
     bytes: int
+    audited: int
     remark: str = ""
 
 
@@ -269,6 +271,11 @@ class Took(NamedTuple):
 
     whole: float
     again: float
+
+    @property
+    def too_dear(self) -> bool:
+        """Whether no variant is computed again unless the study asks for it."""
+        return self.again > max(MOST_TIMES * self.whole, PATIENCE)
 
 
 class Pieces:
@@ -305,10 +312,8 @@ class Pieces:
     def audited_of(self, dataset: xr.Dataset) -> int:
         """The same once it is known what variants were computed with: none where one alone would take much longer than
         all of them did."""
-        count, took = self.audited, self.kind.took(dataset)
-        asked = self.study.solver.audit != "auto"
-        dear = took is not None and took.again > max(MOST_TIMES * took.whole, PATIENCE)
-        return 0 if dear and not asked else count
+        took = self.kind.took(dataset) if self.study.solver.audit == "auto" else None
+        return 0 if took is not None and took.too_dear else self.audited
 
     def place(self, where: Where) -> AbstractContextManager[Place]:
         """Threads."""

@@ -101,7 +101,7 @@ def foreseen(study: Study, question: Question, threads: int, audited: int) -> Fo
     most = min(max(map(int, marched), default=MODES[0]), MAX_MODES)  # no study file may fix more
     fuller = study.with_values({f"body.{name}.modes": most for name in open_bodies(study)})
     table = _taken(cases, {variant: found[variant] for variant in sorted(found)})
-    return Foreseen(fuller, table, float(each * (marches + again)), _bytes(study, cases), _doubt(found))
+    return Foreseen(fuller, table, float(each * (marches + again)), _bytes(study, cases), audited, _doubt(found))
 
 
 def _doubt(found: dict[int, Converged]) -> str:

@@ -22,7 +22,7 @@ SHEAR = 0.02  # relative difference of rotations and slopes beyond which the spl
 
 def findings(body: Imported, held: HeldModel, along: LineShapes) -> tuple[tuple[str, str], ...]:
     """Pairs of what was looked at and what was found."""
-    file = held.file
+    file, resisted = held.file, _resisted(held)
     modal = int(np.count_nonzero(file.owner < 0))
     rows = f"{len(held.free)} free of {file.size}" + (f", {modal} of them modal coordinates" if modal else "")
     massless, rigid = int(np.count_nonzero(held.mass.diagonal() == 0.0)), held.flexibility.rigid.shape[1]
@@ -34,21 +34,20 @@ def findings(body: Imported, held: HeldModel, along: LineShapes) -> tuple[tuple[
             f"{massless} of {len(held.free)}: they follow statically" if massless else "none",
         ),
         ("rigid-body modes", f"{rigid}" if rigid else "none: the supports hold the body"),
-        ("rigid motions by the coordinates", _grounding(held)),
-        ("mass by rigid motions", _mass(held)),
+        ("rigid motions by the coordinates", _grounding(resisted)),
+        ("mass by rigid motions", _mass(held, resisted)),
         ("centre of mass", _centre(body, held)),
         ("track", _track(body, held)),
         ("slope between nodes", _slopes(body, held, along)),
     )
 
 
-def _grounding(held: HeldModel) -> str:
+def _grounding(resisted: float | None) -> str:
     """Whether the coordinates fit the matrices, in words."""
-    worst = _resisted(held)
-    if worst is None:
+    if resisted is None:
         return "not judged: the file holds nodes"
-    more = " (0 for a model that nothing holds)" if worst > FITS else ""
-    return f"{worst:.2g} of the stiffness resists them{more}"
+    more = " (0 for a model that nothing holds)" if resisted > FITS else ""
+    return f"{resisted:.2g} of the stiffness resists them{more}"
 
 
 def _resisted(held: HeldModel) -> float | None:
@@ -65,15 +64,17 @@ def _resisted(held: HeldModel) -> float | None:
     return float(share.max())
 
 
-def _mass(held: HeldModel) -> str:
+def _mass(held: HeldModel, resisted: float | None) -> str:
     """What unit motions of all nodes move: the same in every direction in which nodes move, of a model that fits."""
-    moved = {axis: mass for axis, mass in zip("xyz", np.diag(held.inertia)[:3], strict=True) if mass > 0.0}
-    masses, ways = np.array([*moved.values(), 0.0][: len(moved) or 1]), ", ".join(moved) or "x, y, z"
-    if np.ptp(masses) > SAME_MASS * masses.max():
-        words = f"{', '.join(f'{mass:.6g}' for mass in masses)} kg along {ways}: not the same"
+    masses = np.diag(held.inertia)[:3]
+    moves = masses > 0.0
+    if not moves.any():
+        return "none"
+    moved, ways = masses[moves], ", ".join(np.array(["x", "y", "z"])[moves])
+    if np.ptp(moved) > SAME_MASS * moved.max():
+        words = f"{', '.join(f'{mass:.6g}' for mass in moved)} kg along {ways}: not the same"
     else:
-        words = f"{masses[0]:.6g} kg {'in all directions' if len(moved) == 3 else f'along {ways}'}"
-    resisted = _resisted(held)
+        words = f"{moved[0]:.6g} kg {'in all directions' if moves.all() else f'along {ways}'}"
     partly = resisted is not None and resisted > FITS
     return f"{words}; what moves at held or left out nodes is not counted" if partly else words
 

@@ -5,7 +5,8 @@ import pytest
 import xarray as xr
 
 from studies.kinds.moving_frames import KIND
-from studies.protocol.parts import Pieces
+from studies.moving.preview import _audits_are_too_dear
+from studies.protocol.parts import Piece, Pieces
 from tests.floating.studies.scenes import driven
 
 
@@ -26,3 +27,11 @@ def test_one_that_would_take_much_longer_than_the_run_is_left_out(dataset: xr.Da
     assert parts.audited > 0 and (parts.audited_of(dataset) > 0) == audited
     asked = Pieces(KIND, study.with_values({"solver.audit": 2}))
     assert asked.audited_of(dataset) == 2
+
+
+def test_check_foresees_that_of_some_pieces() -> None:
+    """Of eight variants, and of a piece like it besides, in which as many more share the audit."""
+    pieces = [Piece(name, "", lambda work: xr.Dataset(), 1.0) for name in ("one", "two")]
+    found = {0: used(64, 100_000, 8)}
+    assert _audits_are_too_dear(pieces[:1], found) and not _audits_are_too_dear(pieces, found)
+    assert not _audits_are_too_dear(pieces, {})
