@@ -4,6 +4,7 @@ xarray carries them as it carries those of files that it opens itself: to select
 """
 
 import math
+from collections import OrderedDict
 from collections.abc import Callable
 from typing import Any
 
@@ -13,7 +14,7 @@ from xarray.core import indexing
 
 from results_schema.blocks import APART
 
-RECENT_BYTES = 2**27  # of the array that was read last, which is likely to be asked for again
+RECENT_BYTES = 2**28  # of what was read last, which is likely to be asked for again
 
 Read = Callable[[slice, tuple[int | slice, ...]], np.ndarray]
 
@@ -32,37 +33,52 @@ class OnDisk(BackendArray):
         """The numbers at some rows (a slice, or one) and further places."""
         rows = key[0] if isinstance(key[0], slice) else slice(key[0], key[0] + 1)
         first, end, step = rows.indices(self.shape[0])
-        whole = (first, end) == (0, self.shape[0]) and not self._is_column(key) and self.nbytes <= RECENT_BYTES
-        if _RECENT.array is self or whole:
-            return np.asarray(_RECENT.whole(self)[key])
+        column = self._column(key)
+        if _RECENT.has(self, column) or ((first, end) == (0, self.shape[0]) and _RECENT.holds(self, column)):
+            return np.asarray(_RECENT.read(self, column)[key if column is None else key[:-1]])
         found = self.read(slice(first, max(first, end)), key[1:])
         return np.asarray(found[::step] if isinstance(key[0], slice) else found[0])
 
-    def _is_column(self, key: tuple[int | slice, ...]) -> bool:
-        """Whether one of a few numbers of each variant is asked for: they lie apart."""
-        return len(self.shape) > 1 and self.shape[-1] <= APART and not isinstance(key[-1], slice)
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of all of it."""
-        return math.prod(self.shape) * self.dtype.itemsize
+    def _column(self, key: tuple[int | slice, ...]) -> int | None:
+        """Which one of a few numbers of each variant is asked for, as they lie apart; None of all."""
+        one = key[-1]
+        return one if len(self.shape) > 1 and self.shape[-1] <= APART and not isinstance(one, slice) else None
 
 
 class _Recent:
-    """The array that was read last as a whole."""
+    """The arrays, and columns of a few numbers of each variant, that were read last as wholes."""
 
     def __init__(self) -> None:
-        self.array: OnDisk | None = None
-        self._numbers = np.empty(0)
+        self._numbers: OrderedDict[tuple[OnDisk, int | None], np.ndarray] = OrderedDict()
 
-    def whole(self, array: OnDisk) -> np.ndarray:
+    def has(self, array: OnDisk, column: int | None) -> bool:
+        """Whether it is in memory."""
+        return (array, column) in self._numbers
+
+    def holds(self, array: OnDisk, column: int | None) -> bool:
+        """Whether there would be room for it."""
+        return _bytes(array, column) <= RECENT_BYTES
+
+    def read(self, array: OnDisk, column: int | None) -> np.ndarray:
         """An array, not to be changed, from memory where it is there."""
-        if self.array is not array:
-            self.array, self._numbers = None, np.empty(0)  # first: both together would be too much
-            self._numbers = array.read(slice(0, array.shape[0]), ())
-            self._numbers.flags.writeable = False
-            self.array = array
-        return self._numbers
+        if not self.has(array, column):
+            self._make_room(_bytes(array, column))
+            rest: tuple[int | slice, ...] = () if column is None else (*[slice(None)] * (len(array.shape) - 2), column)
+            numbers = array.read(slice(0, array.shape[0]), rest)
+            numbers.flags.writeable = False
+            self._numbers[array, column] = numbers
+        self._numbers.move_to_end((array, column))
+        return self._numbers[array, column]
+
+    def _make_room(self, size: int) -> None:
+        """Forget what was asked for longest ago, before more is read."""
+        held = sum(numbers.nbytes for numbers in self._numbers.values())
+        while self._numbers and held + size > RECENT_BYTES:
+            held -= self._numbers.popitem(last=False)[1].nbytes
+
+
+def _bytes(array: OnDisk, column: int | None) -> int:
+    return math.prod(array.shape if column is None else array.shape[:-1]) * array.dtype.itemsize
 
 
 _RECENT = _Recent()
