@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 
 from engine.march.envelopes import envelope_names
-from engine.march.rest import names_of_times
+from engine.march.settling import names_of_times
 from engine.model.lane_table import weights
 from engine.observation.contact_forces import contacts_that_react
 from engine.observation.cycle_reduction import HISTORY_PART, Compared

@@ -18,7 +18,7 @@ from engine.accuracy.shown import stations_shown
 from engine.kernels.layout import LANES
 from engine.linear_algebra import one_thread
 from engine.march.outcome import USED, Asked, Flat, Outcome, histories
-from engine.march.rest import WIDER, names_of_times
+from engine.march.settling import change_within, names_of_times, told_part
 from engine.observation.cycle_reduction import HISTORY_PART
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array, Counts
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 #: Jobs of short chunks, at least, and chunks of one: handed over one by one to two processes 600 scenes took 20.8 s in
 #: place of 11.4, as that takes as long as what each computes.
 LEAST_JOBS, MOST_IN_JOB = 32, 16
-MOST_OF_TIMES = 1.0  # of a settling time: a larger error says no more than that there is no estimate
 OF_CRASHED = {"status": np.int8(Status.CRASHED), "diverged_step": np.int64(-1)}  # other whole numbers are 0
 
 
@@ -145,21 +144,11 @@ def _told_of_times(outcome: Outcome, asked: Asked, error: Mapping[str, Array]) -
             continue
         residual, off = outcome.numbers[f"{name}_residual"], error[f"{name}_residual"] * outcome.scale[:, j]
         settling_time, _ = own = names_of_times(name)
-        change = _within_bands(outcome, name, off / HISTORY_PART / sensor.settling_band, outcome.numbers[settling_time])
+        parts = off / HISTORY_PART / sensor.settling_band
+        change = change_within(outcome.other_bands[name], parts, outcome.numbers[settling_time])
         for result in own:
-            took = outcome.numbers[result]
-            part = np.divide(change, took, out=np.where(change == 0.0, 0.0, np.inf), where=took > 0.0)
-            part[residual + off < sensor.settling_band] = 0.0
-            # No estimate either of what stays within, of a rest that is too short to tell.
-            error[result][:] = np.where((part <= MOST_OF_TIMES) & ~np.isnan(took), part, np.nan)
-
-
-def _within_bands(outcome: Outcome, sensor: str, parts: Array, took: Array) -> Array:
-    """(V,) by how much a settling time changes at most where its band is wider or narrower by parts of it (V,); NaN
-    where that is more than is known, or it has not settled in the narrower one."""
-    times = np.concatenate([outcome.other_bands[sensor], np.full((took.size, 2, 1), np.nan)], axis=2)
-    place = np.searchsorted(WIDER, np.where(np.isnan(parts), np.inf, parts))
-    return np.asarray(np.abs(times[np.arange(took.size), :, place] - took[:, None]).max(axis=1))
+            stays = residual + off < sensor.settling_band
+            error[result][:] = told_part(change, outcome.numbers[result], stays)
 
 
 def _worst(error: Array, results: tuple[Result, ...]) -> Array:

@@ -14,6 +14,7 @@ from engine.accuracy.reference import left_over
 from engine.floating.march import march
 from engine.floating.model import build
 from engine.floating.results import Outcome, Result, differences, outcome, results_of
+from engine.floating.settling import tell_times
 from engine.kernels.floating.layout import Weights
 from engine.kernels.schemes import SCHEMES, AlphaScheme, NewmarkScheme
 from engine.march.stepper import Halted
@@ -162,6 +163,8 @@ def converge(
     missed = np.where(held > 1.0, np.int8(Status.TOLERANCE_MISSED), np.int8(Status.OK))
     status = np.where(unresolved, np.int8(Status.UNRESOLVED), missed)
     error[:, lost(found.status)] = np.nan
+    of_results = {result.name: own for result, own in zip(results, error, strict=True)}
+    tell_times(model, found.numbers, found.other_bands, of_results)
     return Converged(found, error, modes, steps, scheme, rung.fidelity, gravest(status, found.status))
 
 
@@ -211,8 +214,5 @@ def _replaced(found: Outcome, lanes: Counts, other: Outcome) -> Outcome:
     """The same with the outcome of other marches for some of the variants."""
     if lanes.size == found.status.size:
         return other
-    for name, array in found.numbers.items():
-        array[lanes] = other.numbers[name]
-    found.history[lanes], found.times[lanes], found.status[lanes] = other.history, other.times, other.status
-    found.sooner[lanes] = other.sooner
+    found.put(lanes, other)
     return found

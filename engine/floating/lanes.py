@@ -73,7 +73,8 @@ def in_blocks(table: Array) -> Array:
 
 def out_of_blocks(table: NDArray[Any], variants: int) -> NDArray[Any]:
     """(blocks, ..., LANES) as (V, ...)."""
-    return np.ascontiguousarray(np.moveaxis(table, -1, 1).reshape(-1, *table.shape[1:-1])[:variants])
+    rows = table.shape[0] * table.shape[-1]
+    return np.ascontiguousarray(np.moveaxis(table, -1, 1).reshape(rows, *table.shape[1:-1])[:variants])
 
 
 def _start_joint(joint: OneJoint, numbers: Numbers, start: Array, springs: Array) -> None:

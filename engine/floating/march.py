@@ -28,7 +28,9 @@ STATUS = np.array([Status.OK, Status.NOT_CONVERGED, Status.DIVERGED, Status.SEPA
 @dataclass(frozen=True, eq=False)
 class Marched:
     """What a march of V variants leaves: statistics (V, signals, STATISTICS), history (V, stations, signals) with its
-    times (V, stations) s, statuses (V,), the step (V,) s, and the last station that each has reached (V,)."""
+    times (V, stations) s, statuses (V,), the step (V,) s, and the last station that each has reached (V,); stops
+    (V, tips) s, infinite where there is none, and settled (V, tips, bands): steps after which tips are within bands for
+    good, -inf where they always are."""
 
     statistics: Array
     history: Array
@@ -36,6 +38,8 @@ class Marched:
     status: NDArray[np.int8]
     step: Array
     last: Counts
+    stops: Array
+    settled: Array
 
 
 def march(
@@ -58,8 +62,10 @@ def march(
     history = np.full((shape[0], stations.size, shape[1], LANES), np.nan)
     codes, last = np.zeros((2, shape[0], LANES), dtype=np.int64)
     system = model.system._replace(given=fidelity == Fidelity.GIVEN_FRAME)
-    march_lanes(system, in_lanes, scheme, steps, Record(np.asarray(stations), statistics, history, codes, last))
-    statistics, history, codes, last = (out_of_blocks(part, V) for part in (statistics, history, codes, last))
+    settled = np.full((shape[0], *system.bands.shape, LANES), -np.inf)
+    kept = statistics, history, settled, codes, last
+    march_lanes(system, in_lanes, scheme, steps, Record(np.asarray(stations), *kept))
+    statistics, history, settled, codes, last = (out_of_blocks(part, V) for part in kept)
     # without gravity nothing lies on a track: it holds what moves on it
     heavy = table.gravity[:, 2] > 0.0
     first = model.signal_of("carriages") + CONTACT_FORCE
@@ -67,4 +73,4 @@ def march(
         statistics[:, first : model.signal_of("ends") : OF_CARRIAGE, layout.SMALLEST].min(axis=1, initial=0.0) < 0.0
     )
     status = gravest(STATUS[codes], np.where(lifts, np.int8(Status.SEPARATED), np.int8(Status.OK)))
-    return Marched(statistics, history, stations * h[:, None], status, h, last)
+    return Marched(statistics, history, stations * h[:, None], status, h, last, table.stops, settled)

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from engine.floating.settling import banded, settled
 from engine.floating.theory import bent_times, unstiffened_times
 from engine.kernels.floating.layout import LARGEST, LARGEST_AT, SMALLEST, SMALLEST_AT, SQUARES
 from engine.kernels.floating.observe import OF_BODY, OF_CARRIAGE, OF_POINT
+from engine.march.settling import names_of_times
 from results_schema.arrays import Array, Counts
 from results_schema.gravest_status import gravest, lost
 from results_schema.quantities import AFTER_STOP, QUANTITIES
@@ -66,18 +68,33 @@ class Result(NamedTuple):
 class Outcome:
     """What V variants report by one march: numbers (V,) and (V, B, 3) by name, histories (V, stations, signals) of all
     signals with their times (V, stations), statuses (V,), and the part of a variant's time (V,) by which it may have
-    ended sooner: of what has slid over an end its last step."""
+    ended sooner: of what has slid over an end its last step; other_bands: by sensor the settling times in other bands
+    than its own."""
 
     numbers: dict[str, Array]
     history: Array
     times: Array
     status: np.ndarray[tuple[int], np.dtype[np.int8]]
     sooner: Array
+    other_bands: dict[str, Array]
 
     def of(self, lanes: Counts) -> Outcome:
         """That of some of the variants."""
-        numbers = {name: array[lanes] for name, array in self.numbers.items()}
-        return Outcome(numbers, self.history[lanes], self.times[lanes], self.status[lanes], self.sooner[lanes])
+        numbers, others = ({name: array[lanes] for name, array in own.items()} for own in self._by_name)
+        rest = self.history[lanes], self.times[lanes], self.status[lanes], self.sooner[lanes]
+        return Outcome(numbers, *rest, others)
+
+    def put(self, lanes: Counts, other: Outcome) -> None:
+        """Replace some of the variants by those of another outcome."""
+        for own, others in zip(self._by_name, other._by_name, strict=True):
+            for name, array in own.items():
+                array[lanes] = others[name]
+        self.history[lanes], self.times[lanes], self.status[lanes] = other.history, other.times, other.status
+        self.sooner[lanes] = other.sooner
+
+    @property
+    def _by_name(self) -> tuple[dict[str, Array], dict[str, Array]]:
+        return self.numbers, self.other_bands
 
 
 def signals(model: FloatingModel) -> Iterator[Signal]:
@@ -130,7 +147,8 @@ def results_of(model: FloatingModel) -> tuple[Result, ...]:
         found += [Result(f"{signal.name}_{end}", signal.tolerance, signal.follows) for end in ENDS]
     tolerance = model.study.solver.tolerance
     moves = any(model.frame(name).joints for name in model.bodies)
-    return (*found, *(Result(f"far end of {name}", tolerance if moves else np.nan, moves) for name in model.bodies))
+    found += [Result(f"far end of {name}", tolerance if moves else np.nan, moves) for name in model.bodies]
+    return (*found, *(Result(time, np.nan, False) for name in banded(model) for time in names_of_times(name)))
 
 
 def outcome(model: FloatingModel, marched: Marched) -> Outcome:
@@ -154,14 +172,16 @@ def outcome(model: FloatingModel, marched: Marched) -> Outcome:
     energy = marched.history[:, :, whole + KINETIC] + marched.history[:, :, whole + POTENTIAL]
     found["energy_change"] = np.nanmax(np.abs(energy - energy[:, :1]), axis=1)
     found["duration"] = marched.last * step
+    times, other_bands = settled(model, marched)
+    found |= times
     limits = {"unstiffened_time": unstiffened_times(model, marched), "bent_time": bent_times(model, marched)}
-    for array in (*found.values(), marched.history):
+    for array in (*found.values(), *other_bands.values(), marched.history):
         array[lost(marched.status)] = np.nan
     left = np.isfinite(np.concatenate(list(limits.values()), axis=1)).any(axis=1)
     status = gravest(marched.status, np.where(left, np.int8(Status.BEYOND_THEORY), np.int8(Status.OK)))
     ended = duration < marched.times[:, -1] * (1.0 - ROUNDING)
     sooner = np.where(ended, 1.0 / np.maximum(marched.last, 1), 0.0)
-    return Outcome(found | limits, marched.history, marched.times, status, sooner)
+    return Outcome(found | limits, marched.history, marched.times, status, sooner, other_bands)
 
 
 def differences(model: FloatingModel, one: Outcome, other: Outcome) -> Array:
@@ -186,6 +206,10 @@ def differences(model: FloatingModel, one: Outcome, other: Outcome) -> Array:
             found.append(np.divide(gap, scale, out=np.where(gap > 0.0, np.inf, 0.0), where=scale > 0.0))
     of_ends = gaps[:, ends(model)].reshape(-1, len(model.bodies), 3).max(axis=2)
     found += [of_ends[:, b] / body.length for b, body in enumerate(model.bodies.values())]
+    for time in (time for name in banded(model) for time in names_of_times(name)):
+        gap, took = np.abs(one.numbers[time] - other.numbers[time]), other.numbers[time]
+        gap = np.where(np.isnan(gap), np.where(np.isnan(one.numbers[time]) & np.isnan(took), 0.0, np.inf), gap)
+        found.append(np.divide(gap, took, out=np.where(gap > 0.0, np.inf, 0.0), where=took > 0.0))
     apart = np.stack(found)
     sooner = np.abs(one.numbers["duration"] - other.numbers["duration"]) / other.numbers["duration"]
     left = one.status == Status.SEPARATED

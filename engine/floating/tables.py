@@ -9,6 +9,7 @@ import numpy as np
 from engine.floating.attachments import grip_tables, shorter_at, tip_tables
 from engine.floating.bodies.elastic import CELLS
 from engine.floating.bodies.fields import Y, Z
+from engine.floating.settling import bands_of
 from engine.kernels.floating import layout as columns
 from engine.kernels.floating.layout import System
 from engine.kernels.floating.observe import OF_CARRIAGE
@@ -75,6 +76,7 @@ def system_of(model: FloatingModel) -> System:
         tips.places,
         tips.shorter,
         tips.carrying,
+        bands_of(model),
         _drives(model),
         np.array([np.any(body.shapes != 0.0, axis=(0, 2)) for body in model.bodies.values()]).reshape(B, 3),
         np.ascontiguousarray(np.argwhere(np.abs(pairs).max(axis=3) > ROUNDING)),

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from engine.kernels import layout
+from engine.march.settling import STILL, names_of_times, parts_of_bands, split
 from engine.model.lane_table import weights
 from engine.model.scene_model import with_numerics
 from engine.model.station_path import standing
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
     from engine.scene.study import Study
     from engine.scene.variants import VariantValues
 
-STILL = 1e-9  # of its band: what a sensor is off where nothing swings is rounding
 # What is said of the next four was measured on a girder whose trolley's load hangs on a rope, and on a portal's head.
 BEATS = 2.0  # that have to be seen: after one 3.1 s were told where 4.5 are true
 #: Modes of the scene whose periods and beats count: 3 to 8 told the same; and of each body that tell them, with static
@@ -33,9 +33,6 @@ BEATS = 2.0  # that have to be seen: after one 3.1 s were told where 4.5 are tru
 LOWEST, FEW = 4, 8
 ALIKE = 0.02  # of a frequency, by which modes beat that are no further apart, too slowly: 0.01 to 0.05 told the same
 READ = 0.01  # of the reading of the mode that a sensor reads most of: 0.001 told the same, 0.1 left the load's mode out
-#: Parts of a band by which readings may be off, of which errors of times are told. Of 4,800 passages at 1e-2 and 1e-3
-#: 0 to 2.6 % were further off than told; by neighbours' own, which know nothing of a swing more or less, 1 to 9 %.
-WIDER = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4)
 MOST_STATIONS = 4097  # of a rest on which it is looked for when sensors have settled: 16 of each of 256 swings
 
 
@@ -53,11 +50,6 @@ def residuals(tables: SceneTables, values: VariantValues, marched: Marched) -> d
 def settling(study: Study) -> list[str]:
     """The sensors of which it is told how long they take to settle."""
     return [name for name, sensor in study.sensor.items() if sensor.settling_band is not None]
-
-
-def names_of_times(sensor: str) -> tuple[str, str]:
-    """The results that tell when a sensor has settled: after the stop, and since time 0."""
-    return f"{sensor}_settling_time", f"{sensor}_move_and_settle_time"
 
 
 def most_settling(study: Study) -> int:
@@ -87,10 +79,8 @@ def settling_times(tables: SceneTables, values: VariantValues, counts: Counts, h
     found = Settling({}, {})
     for rest in _rests(tables, values, counts, history):
         settling_time, move_and_settle_time = names_of_times(rest.sensor)
-        wider = np.array(WIDER)
-        own, *others = rest.settled_within(np.concatenate([[1.0], 1.0 + wider, 1.0 - wider]))
+        own, found.other_bands[rest.sensor] = split(rest.settled_within(parts_of_bands()))
         found.times[settling_time], found.times[move_and_settle_time] = own, rest.begins + own
-        found.other_bands[rest.sensor] = np.moveaxis(np.reshape(others, (2, wider.size, -1)), 2, 0)
     return found
 
 

@@ -87,7 +87,7 @@ def _check_sensor(study: Study, name: str, sensor: Sensor) -> None:
         what = "the carriage rides on another body"
         raise study.source.fault(f"{here}.body", what, expected=f'"{body}"', received=received)
     _check_quantity(study, here, body, sensor.quantity)
-    if sensor.settling_band is not None and not study.output.residual:
+    if sensor.settling_band is not None and not (study.output.residual or sensor.reads.of_arm):
         what, expected = "how long a sensor takes to settle is told of residual vibrations", "[output] residual = true"
         raise study.source.fault(f"{here}.settling_band", what, expected=f"{expected} beside it, or no settling_band")
     if sensor.spot is not None:

@@ -58,8 +58,9 @@ def _check_limit(limit: float | None, reads: Quantity) -> None:
 
 
 def _check_band(sensor: Sensor) -> None:
-    if sensor.settling_band is not None and (sensor.reads.of_arm or sensor.reads.unit != "m"):
-        raise fault("a settling_band is one of displacements", expected='quantity = "displacement"')
+    if sensor.settling_band is not None and sensor.reads.unit != "m":
+        expected = 'quantity = "displacement", or "position_error" where frames move'
+        raise fault("a settling_band is one of displacements", expected=expected)
 
 
 def _check_part(sensor: Sensor) -> None:
@@ -128,7 +129,8 @@ class Sensor(Spec):
     of `solver.tolerance`; "told": its error is told and makes no status, as for velocities, accelerations and contact
     forces where nothing is given. frequency_limit: up to it modes count in a velocity or an acceleration, which
     converges then and is held.
-    settling_band: within which of its static value a displacement has settled after a stop.
+    settling_band: within which of its static value a displacement has settled after a stop; how small a position error
+    is then.
     part: "dynamic" for what it reads less what it would read if all carriages stood still where they are.
     """
 

@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from engine.march.rest import names_of_times, settling
+from engine.march.rest import settling
+from engine.march.settling import names_of_times
 from engine.scene.study import Study
 from results_schema.arrays import Array, Mask
 from studies.findings.absolute_errors import absolute_errors, told_error
@@ -69,9 +70,13 @@ class Times(NamedTuple):
 
 def settle_together(results: Results) -> list[str]:
     """Sensors with a time of move and settling, where motions differ in these; none where that is one's alone."""
-    banded = [name for name in results.sensors if results.study.sensor[name].settling_band is not None]
-    found = [name for name in banded if moves_differ(results, name) and not has_whole(results, name)]
+    found = [name for name in banded(results) if moves_differ(results, name) and not has_whole(results, name)]
     return found if len(found) > 1 else []
+
+
+def banded(results: Results) -> list[str]:
+    """Sensors of which it is told when they have settled."""
+    return [name for name in results.sensors if results.study.sensor[name].settling_band is not None]
 
 
 def moves_differ(results: Results, sensor: str) -> bool:
@@ -122,11 +127,17 @@ def residuals(results: Results, asked: AskedOfRest) -> list[str]:
         doubt = absolute_errors(results, f"{sensors[0]}_residual")
         effects = told_effects(results, residual_of(results, sensors[0]), "the largest such swing", doubt)
         said[0] += f" {effects}" if effects else ""
+    return [*until_settled(results, sensors), *said]
+
+
+def until_settled(results: Results, sensors: Sequence[str]) -> list[str]:
+    """The shortest times until all sensors that have a band have settled, else the first of some, as a sentence; none
+    where motions come to rest at the same time."""
     if together := settle_together(results):
-        return [f"{_until(results, together)}.", *said]
-    banded = (name for name in sensors if results.study.sensor[name].settling_band is not None)
-    alone = next((name for name in banded if moves_differ(results, name)), None)
-    return [f"{_until(results, [alone])}.", *said] if alone else said
+        return [f"{_until(results, together)}."]
+    own = banded(results)
+    alone = next((name for name in sensors if name in own and moves_differ(results, name)), None)
+    return [f"{_until(results, [alone])}."] if alone else []
 
 
 def _until(results: Results, sensors: Sequence[str]) -> str:
@@ -165,7 +176,8 @@ def _residual(results: Results, sensor: str, asked: AskedOfRest) -> str:
         f"{told_error(error, size, units)}{in_words(results, place)}"
     )
     axis = next(iter(by_effect(results, values)), None)
-    limit, settled = asked.residual.of(results.study.sensor[sensor]), _settled(results, sensor, asked, axis)
+    limit = asked.residual.of(results.study.sensor[sensor])
+    settled = settling_in_words(results, sensor, asked.settling_time, axis)
     between = told_both_ways(results, values, "that swing", units, doubt) + _told_between(results, values, place)
     if limit is None:
         return f"{said}{settled}.{between}"
@@ -195,9 +207,9 @@ def _up_and_down(axis: Axis) -> str:
     )
 
 
-def _settled(results: Results, sensor: str, asked: AskedOfRest, axis: Axis | None) -> str:
-    """How long a sensor takes to settle at most, where along a swept number that is longer than is asked, and how many
-    variants have not by the end of their runs."""
+def settling_in_words(results: Results, sensor: str, limit: float | None, axis: Axis | None) -> str:
+    """How long a sensor takes to settle at most, where along a swept number that is longer than a limit (s), and how
+    many variants have not by the end of their runs, behind another sentence; "" where it has no band."""
     band = results.study.sensor[sensor].settling_band
     if band is None:
         return ""
@@ -213,9 +225,9 @@ def _settled(results: Results, sensor: str, asked: AskedOfRest, axis: Axis | Non
         took, error = float(values[place]), float(absolute_errors(results, names_of_times(sensor)[0])[place])
         when = f"{quantity(took, 's')}{told_error(error, took, 's')} after the stop at the latest"
         said.append(f"{among}it has settled {within} {when}{in_words(results, place)}")
-    if asked.settling_time is not None:
-        longer = where_beyond(results, np.where(np.isnan(values), np.inf, values), asked.settling_time, axis)
-        said.append(f"it takes longer than {quantity(asked.settling_time, 's')} {longer}")
+    if limit is not None:
+        longer = where_beyond(results, np.where(np.isnan(values), np.inf, values), limit, axis)
+        said.append(f"it takes longer than {quantity(limit, 's')} {longer}")
     if left:
         said.append(_not_settled(results, results.with_values & np.isnan(values), axis))
     return "".join(f"; {one}" for one in said)

@@ -4,11 +4,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from engine.march.settling import names_of_times
 from results_schema.quantities import AFTER_STOP
 from studies.findings.absolute_errors import errors_of_size
 from studies.findings.amplification import sizes
 from studies.findings.beyond import limits_of, ranked, told_limit
 from studies.findings.effects import by_effect, told_effects
+from studies.findings.residual import settling_in_words, settling_of, until_settled
 from studies.moving.question import Question
 from studies.protocol.study import question_of
 from studies.results.findings_common import in_words, over_all, told_statuses, uncertainty, while_held
@@ -76,6 +78,7 @@ def _ended(results: Results, seconds: float) -> Iterator[str]:
 def _sensors(results: Results) -> Iterator[str]:
     limits = limits_of(results.study)
     told = ranked(results, limits)[:MOST_SENSORS]
+    yield from until_settled(results, told)
     for sensor in told:
         low, high = (results.dataset[f"{sensor}_{end}"].where(results.with_values) for end in ("min", "max"))
         if np.isnan(low.values).all():
@@ -114,7 +117,18 @@ def _position_error(results: Results, sensor: str, beyond: str) -> Iterator[str]
     what = f"{while_held(results)}the largest position error {where}"
     yield f"{sensor}: {what}, from where the rigid arm would have it, is {most}.{beyond}"
     if after:
-        yield f"After the stop it is still up to {after}.{_beyond_after(results, sensor)}"
+        settles = _settles(results, sensor)
+        yield f"After the stop it is still up to {after}.{_beyond_after(results, sensor)}{settles}"
+
+
+def _settles(results: Results, sensor: str) -> str:
+    """How long a position error takes to settle, behind another sentence; "" where that is not asked."""
+    if results.study.sensor[sensor].settling_band is None:
+        return ""
+    times = settling_of(results, names_of_times(sensor)[0])
+    axis = next(iter(by_effect(results, times)), None) if np.isfinite(times).any() else None
+    said = settling_in_words(results, sensor, question_of(results.study, Question).settling_time, axis)
+    return f" {sensor}: {said.removeprefix('; ')}."
 
 
 def _beyond_after(results: Results, sensor: str) -> str:

@@ -20,17 +20,22 @@ class AfterStop(Spec):
 
 class Question(Limits):
     """The table [question]. duration: s, of the march. The limits: of absolute values, of which is told for every
-    sensor of that quantity from which swept value on they are exceeded; residual: of those after the stop."""
+    sensor of that quantity from which swept value on they are exceeded; residual: of those after the stop;
+    settling_time: of how long position errors take to settle."""
 
     duration: Time = Field(gt=0)
     position_error: Annotated[Length, Field(gt=0)] | None = None
     drive_torque: Annotated[Torque, Field(gt=0)] | None = None
     drive_force: Annotated[Force, Field(gt=0)] | None = None
     residual: AfterStop = AfterStop()
+    settling_time: Annotated[Time, Field(gt=0)] | None = None
 
 
 def check_residual(study: Study, asked: Question) -> None:
     """Refuse limits of what nothing reads. Raises BadInput."""
+    if asked.settling_time is not None and all(one.settling_band is None for one in study.sensor.values()):
+        what = "a limit of settling times, of which no sensor has one"
+        raise study.source.fault("question.settling_time", what, expected="a settling_band of a sensor")
     if asked.residual.position_error is not None and not any(one.reads.of_arm for one in study.sensor.values()):
         raise study.source.fault(
             "question.residual.position_error",

@@ -99,6 +99,23 @@ RESULTS = (
         replace(variable, required=False, nan_allowed=True)
         for variable in _ends(f"{{sensor}}{AFTER_STOP}", "{sensor}", "value of {sensor} after the stop", OF_STOPS)
     ),
+    Variable(
+        "{sensor}_settling_time",
+        units="s",
+        long_name="settling time of {sensor}",
+        meaning="after the stop, until it stays within its settling_band of where it comes to rest; NaN where that is "
+        "less than two longest periods before the end",
+        required=False,
+        nan_allowed=True,
+    ),
+    Variable(
+        "{sensor}_move_and_settle_time",
+        units="s",
+        long_name="time of move and settling of {sensor}",
+        meaning="from time 0 until then; NaN as that",
+        required=False,
+        nan_allowed=True,
+    ),
     *_of_carriages(),
     *(
         Variable(

@@ -12,9 +12,11 @@ from results_schema.quantities import AFTER_STOP
 from studies.findings.amplification import largest, sizes
 from studies.findings.beyond import limits_of, of_every_quantity, ranked
 from studies.findings.effects import unchanged
+from studies.findings.residual import banded
 from studies.moving.findings import along_way
 from studies.moving.question import Question
 from studies.pictures.common.figures import Figure, draw, legend_of_all, limit_line, on_method, shades, telling_limits
+from studies.pictures.common.residual import settling
 from studies.pictures.common.sizes import sizes_of
 from studies.pictures.common.sweep_view import View, along_axis, draw_curves, one_legend, view
 from studies.pictures.trajectory import histories, ranging
@@ -41,7 +43,7 @@ def pictures(results: Results) -> list[Figure]:
         name = next(iter(rows))
         over_time.append(histories(results, "histories", ranging(results, name, rows[name], own), caption, rows, own))
     sliding = [_portrait(results, name, shown) for name, c in results.study.carriage.items() if c.motion.slides]
-    over_sweep = list(_over_sweep(results))
+    over_sweep = [*_over_sweep(results), *_settling(results)]
     found = [*over_time, *sliding, *over_sweep] if sliding else [*over_sweep, *over_time]
     energies = {"kinetic_energy": "J", "potential_energy": "J"}
     change = float(np.nanmax(results.dataset["energy_change"].values))
@@ -67,6 +69,12 @@ def _over_sweep(results: Results) -> Iterator[Figure]:
             limit = limits.of(results.study.sensor[own[0]])
             limits_of_tips = limit, question_of(results.study, Question).residual.position_error
             yield telling_limits(_of_tips(seen, tips, limits_of_tips, top)) if tips else sizes_of(seen, own, limit, top)
+
+
+def _settling(results: Results) -> list[Figure]:
+    """How long position errors take to settle."""
+    sensors = [name for name in ranked(results, limits_of(results.study)) if name in banded(results)]
+    return settling(results, sensors[:MOST_TIPS], question_of(results.study, Question).settling_time)
 
 
 def _of_tips(seen: View, tips: list[str], limits: Limited, top: Index) -> Figure:

@@ -9,7 +9,7 @@ from engine.accuracy.groups import Found
 from engine.accuracy.results import results_of
 from engine.batch.chunk import told_errors
 from engine.batch.plan import make_plan
-from engine.march.rest import WIDER
+from engine.march.settling import WIDER
 from engine.observation.cycle_reduction import HISTORY_PART
 from tests.engine.build import beam, fixed, force, study
 

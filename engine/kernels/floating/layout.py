@@ -73,7 +73,8 @@ class System(NamedTuple):
     component that it reads there; 0, 1 or 2 for coordinates, velocities or accelerations. smooth (K): signals that
     have extremes between stations.
     tips (T, 2), tip_places (T, 6 + 3 n): places whose distance from the rigid arm is read; tip_shorter (T, A, n, n): G
-    there; carrying (L): the bodies of these arms, each after its parent.
+    there; carrying (L): the bodies of these arms, each after its parent. bands (T, K), m: of each tip, within which it
+    is told when what is left after a stop stays; none where no study asks.
     drives (D, 2): sensors that read what drives exert, and their joints.
     leans (B, 3): whether a body's modes move it along its x, y and z; pairing (K, 3): bodies, and two of their modes
     that act on each other. given: whether steps take frames and places of carriages as given in time, and need no
@@ -108,6 +109,7 @@ class System(NamedTuple):
     tip_places: FloatArray
     tip_shorter: FloatArray
     carrying: IntArray
+    bands: FloatArray
     drives: IntArray
     leans: BoolArray
     pairing: IntArray
@@ -157,11 +159,13 @@ class Weights(NamedTuple):
 
 class Record(NamedTuple):
     """What a march leaves of blocks of lanes: stations (S): ascending numbers of those whose signals are kept;
-    statistics (blocks, signals, STATISTICS, LANES) of all stations, history (blocks, S, signals, LANES); codes and last
-    stations (blocks, LANES)."""
+    statistics (blocks, signals, STATISTICS, LANES) of all stations, history (blocks, S, signals, LANES); settled
+    (blocks, T, K, LANES): steps after which tips are within their bands for good; codes and last stations
+    (blocks, LANES)."""
 
     stations: IntArray
     statistics: FloatArray
     history: FloatArray
+    settled: FloatArray
     codes: IntArray
     last: IntArray

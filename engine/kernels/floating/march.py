@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from engine.kernels.floating.equations import residual
-from engine.kernels.floating.following import follow_frame
+from engine.kernels.floating.following import follow_frame, follow_rigid
 from engine.kernels.floating.given import step_given
 from engine.kernels.floating.layout import (
     COORDINATE,
@@ -33,7 +33,7 @@ from engine.kernels.floating.layout import (
 )
 from engine.kernels.floating.motions import motions_at
 from engine.kernels.floating.newton import factor_masses, settle, solve_accelerations, step
-from engine.kernels.floating.observe import observe, observe_whole
+from engine.kernels.floating.observe import apart, observe, observe_whole, of_way
 from engine.kernels.floating.state import (
     CODE,
     EVENT,
@@ -49,7 +49,7 @@ from engine.kernels.floating.state import (
     sound,
     take,
 )
-from engine.kernels.floating.vectors import after, keep_matrix, matrix, rotation
+from engine.kernels.floating.vectors import add, after, keep_matrix, matrix, rotation, times
 from engine.kernels.floating.work import room, three_at
 from engine.kernels.jit import called, copied, kernel
 from engine.kernels.layout import LANES, FloatArray
@@ -61,17 +61,20 @@ KEPT = 8
 MOST_BENT = 10.0  # lengths of a body: beyond, a march has diverged, whatever is wrong
 NEAR = 1e-9  # of a step: an event so near to a station falls on it
 JUMP = 1e-12  # of a rate: below it is rounding
+LEFT, LEFT_BEFORE = 4, 3  # numbers of a tip; that of the last station, after the vector
 OFF = 1e-9  # of a length: less over an end of a track is rounding of a given motion
 
 
 class Room(NamedTuple):
-    """What the march of a block of lanes works in; signals (signals, LANES), and past (2, K, LANES): those that are
-    smooth, at the two stations before."""
+    """What the march of a block of lanes works in; signals (signals, LANES), past (2, K, LANES): those that are smooth,
+    at the two stations before, and left (T, LEFT, LANES): where tips come to rest, and how far from there they were
+    after a stop at the last station."""
 
     state: State
     solver: Solver
     signals: FloatArray
     past: FloatArray
+    left: FloatArray
 
 
 @called
@@ -200,16 +203,43 @@ def room_to_march(system, lane, record):
     two, both = np.zeros((2, N, N, LANES)), np.zeros((2, M, 3, LANES))
     memory, signals = np.zeros((MEMORY, LANES)), np.zeros((record.statistics.shape[1], LANES))
     solver = Solver(room(system, lane), np.zeros((N, LANES)), two[0], two[1], both[0], both[1], memory)
-    return Room(state, solver, signals, np.zeros((2, system.smooth.shape[0], LANES)))
+    past, left = np.zeros((2, system.smooth.shape[0], LANES)), np.zeros((system.tips.shape[0], LEFT, LANES))
+    return Room(state, solver, signals, past, left)
+
+
+@called
+def put_start(lane, now):
+    """Coordinates and velocities at time 0."""
+    for k in range(now.y.shape[0]):
+        put_lanes(now.y, (k,), lanes_at(lane.start, (0, k)))
+        put_lanes(now.u, (k,), lanes_at(lane.start, (1, k)))
+
+
+@called
+def come_to_rest(system, lane, end, state, solver, left):
+    """Where tips are, from where the rigid arm would have them, in static equilibrium at the end (s); NaN of lanes that
+    find none."""
+    work, memory = solver.work, solver.memory
+    put_start(lane, state.now)
+    motions_at(lane.motions, end, end, work.piece, work.motions)
+    settle(system, lane, end > 0.0, state, solver)
+    for b in range(system.tree.shape[0]):
+        follow_frame(system, lane, b, state.now, work)
+    for k in range(system.carrying.size):
+        follow_rigid(system, system.carrying[k], work)
+    for t in range(left.shape[0]):
+        a = apart(system, t, state.now, work)
+        for i in range(3):
+            put_lanes(left, (t, i), choose(sound(memory), a[i], np.nan))
+        put_lanes(left, (t, LEFT_BEFORE), all_lanes(0.0))
+    put_lanes(memory, (CODE,), all_lanes(0.0))
 
 
 @called
 def start(system, lane, state, solver):
     """A block of lanes at its start, with the accelerations there."""
     work, memory = solver.work, solver.memory
-    for k in range(state.weight.shape[0]):
-        put_lanes(state.now.y, (k,), lanes_at(lane.start, (0, k)))
-        put_lanes(state.now.u, (k,), lanes_at(lane.start, (1, k)))
+    put_start(lane, state.now)
     turn_bases(system.joint_table, work.base, state.now.y)
     motions_at(lane.motions, all_lanes(0.0), all_lanes(0.0), work.piece, work.motions)
     for b in range(system.tree.shape[0]):  # those that rest are followed once
@@ -227,8 +257,10 @@ def start(system, lane, state, solver):
 @called
 def march_block(system, lane, scheme, steps, block, room, record):
     """One block of lanes from the start to the end, its signals and codes into the record."""
-    state, solver, signals, past = room
+    state, solver, signals, past, left = room
     work, memory, kept = solver.work, solver.memory, 0
+    if system.bands.shape[1]:
+        come_to_rest(system, lane, steps * lanes_at(lane.step, (0,)), state, solver, left)
     start(system, lane, state, solver)
     for number in range(steps + 1):
         if number:
@@ -240,6 +272,8 @@ def march_block(system, lane, scheme, steps, block, room, record):
         watched = observe(system, lane, state.now, work, of(memory, TIME) + near_of(lane), signals)
         count(goes, signals, watched, number, 0.5 if number in (0, steps) else 1.0, record.statistics, block)
         count_between(goes, system.smooth, signals, past, number, record.statistics, block)
+        if system.bands.shape[1]:
+            count_settling(system, lane, state.now, solver, left, number, record.settled[block])
         if kept < record.stations.size and record.stations[kept] == number:
             observe_whole(system, lane, state.now, work, signals, watched)
             for k in range(signals.shape[0]):
@@ -313,6 +347,26 @@ def count_between(who, smooth, signals, past, number, statistics, block):
         smaller = turns & (bend > 0.0) & (value < lanes_at(statistics, (block, j, SMALLEST)))
         put_where(smaller, statistics, (block, j, SMALLEST), value)
         put_where(smaller, statistics, (block, j, SMALLEST_AT), at)
+
+
+@called
+def count_settling(system, lane, x, solver, left, number, settled):
+    """When tips come within bands of where they rest for good, after stops, along a line between stations; NaN where
+    they do not rest."""
+    memory = solver.memory
+    by = of(memory, TIME) + near_of(lane)
+    for t in range(left.shape[0]):
+        who, a = sound(memory) & (by >= lanes_at(lane.stops, (t,))), apart(system, t, x, solver.work)
+        off = size_of(of_way(system, t, add(a, times(-1.0, three_at(left[t], 0)))))
+        before, now = lanes_at(left, (t, LEFT_BEFORE)), choose(who, off, 0.0)
+        put_lanes(left, (t, LEFT_BEFORE), now)
+        for k in range(system.bands.shape[1]):
+            band = system.bands[t, k]
+            comes = who & (now <= band) & (before > band)
+            part = (before - band) / choose(comes, before - now, 1.0)
+            at = choose(comes, number - 1.0 + part, float(number))
+            beyond = who & (choose(now <= band, 0.0, 1.0) > 0.5)  # NaN too
+            put_where(comes | beyond, settled, (t, k), choose(now >= 0.0, at, np.nan))
 
 
 @kernel

@@ -144,7 +144,22 @@ def over_ground(frames, b, d):
 @called
 def position_error(system, t, x, work):
     """How far a place is from where the rigid arm would have it: the length of that, or along a direction."""
-    b, way = system.tips[t, TIP_BODY], shared_vector(system.tip_places, t, TIP_WAY)
+    return of_way(system, t, apart(system, t, x, work))
+
+
+@called
+def of_way(system, t, a):
+    """A vector at a tip as it is read: its length, or along a direction."""
+    way = shared_vector(system.tip_places, t, TIP_WAY)
+    if dot(way, way) > 0.0:
+        return dot(a, way)
+    return root(dot(a, a))
+
+
+@called
+def apart(system, t, x, work):
+    """From where the rigid arm would have a place to where it is."""
+    b = system.tips[t, TIP_BODY]
     d = add(no_vector(), shared_vector(system.tip_places, t, TIP_PLACE))
     told = over_ground(work.rigid, b, d)
     for i in range(system.tree[b, MODES]):
@@ -152,10 +167,7 @@ def position_error(system, t, x, work):
         d = add(d, times(moved, shared_vector(system.tip_places, t, TIP_SHAPES + 3 * i)))
     if system.tree[b, SHORTENED]:
         d = add(d, times(-0.5, nearer(system.tip_shorter, t, span_of(system, b), x.y, x.y)))
-    apart = add(over_ground(work.frames, b, d), times(-1.0, told))
-    if dot(way, way) > 0.0:
-        return dot(apart, way)
-    return root(dot(apart, apart))
+    return add(over_ground(work.frames, b, d), times(-1.0, told))
 
 
 @called

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
-from engine.march.rest import names_of_times
+from engine.march.settling import names_of_times
 from results_schema.arrays import Array
 from studies.findings.absolute_errors import absolute_errors
 from studies.findings.beyond import AskedOfRest, Limits
@@ -68,7 +68,7 @@ def pictures(results: Results, asked: AskedOfRest) -> list[Figure]:
     shown = picked(results, values, MOST_HISTORIES)
     over_sweep = _residuals(results, sensors, asked.residual, len(told) - len(sensors))
     over_time = [_over_time(results, sensors, shown)] if shown else []
-    return [*over_sweep, *_settling(results, sensors, asked), *over_time]
+    return [*over_sweep, *settling(results, sensors, asked.settling_time), *over_time]
 
 
 def _residuals(results: Results, sensors: list[str], limits: Limits, fewer: int) -> list[Figure]:
@@ -90,9 +90,9 @@ def _residuals(results: Results, sensors: list[str], limits: Limits, fewer: int)
     return _over_sweep(results, "residual", rows, swings, caption)
 
 
-def _settling(results: Results, sensors: list[str], asked: AskedOfRest) -> list[Figure]:
+def settling(results: Results, sensors: list[str], asked: float | None) -> list[Figure]:
     """How long sensors take to settle, of those that have a band and do not all settle at once: since the beginning
-    where they come to rest at different times."""
+    where they come to rest at different times; asked: a limit (s) of the time after the stop."""
     known = results.study.sensor
     told = [sensor for sensor in sensors if known[sensor].settling_band is not None]
     told = [one for one in told if np.nanmax(settling_of(results, names_of_times(one)[0]), initial=0.0) > 0.0]
@@ -103,7 +103,7 @@ def _settling(results: Results, sensors: list[str], asked: AskedOfRest) -> list[
     rows, bands = list[Row](), list[str]()
     for sensor in told:
         name = names_of_times(sensor)[with_move]
-        limit, base = (None, None) if with_move else (asked.settling_time, 0.0)
+        limit, base = (None, None) if with_move else (asked, 0.0)
         errors, values = absolute_errors(results, name), settling_of(results, name)
         best = "the shortest" if with_move else ""
         stop = values - settling_of(results, names_of_times(sensor)[0])
