@@ -208,47 +208,44 @@ def room_to_march(system, lane, record):
 
 
 @called
-def put_start(lane, now):
-    """Coordinates and velocities at time 0."""
-    for k in range(now.y.shape[0]):
-        put_lanes(now.y, (k,), lanes_at(lane.start, (0, k)))
-        put_lanes(now.u, (k,), lanes_at(lane.start, (1, k)))
-
-
-@called
-def come_to_rest(system, lane, end, state, solver, left):
-    """Where tips are, from where the rigid arm would have them, in static equilibrium at the end (s); NaN of lanes that
-    find none."""
-    work, memory = solver.work, solver.memory
-    put_start(lane, state.now)
-    motions_at(lane.motions, end, end, work.piece, work.motions)
-    settle(system, lane, end > 0.0, state, solver)
-    for b in range(system.tree.shape[0]):
-        follow_frame(system, lane, b, state.now, work)
+def note_rest(system, state, solver, left):
+    """Where tips are, from where the rigid arm would have them, in the equilibrium of the state; NaN of lanes that
+    found none."""
     for k in range(system.carrying.size):
-        follow_rigid(system, system.carrying[k], work)
+        follow_rigid(system, system.carrying[k], solver.work)
     for t in range(left.shape[0]):
-        a = apart(system, t, state.now, work)
+        a = apart(system, t, state.now, solver.work)
         for i in range(3):
-            put_lanes(left, (t, i), choose(sound(memory), a[i], np.nan))
+            put_lanes(left, (t, i), choose(sound(solver.memory), a[i], np.nan))
         put_lanes(left, (t, LEFT_BEFORE), all_lanes(0.0))
-    put_lanes(memory, (CODE,), all_lanes(0.0))
+    put_lanes(solver.memory, (CODE,), all_lanes(0.0))
 
 
 @called
-def start(system, lane, state, solver):
-    """A block of lanes at its start, with the accelerations there."""
+def start(system, lane, end, state, solver, left):
+    """A block of lanes at its start, with the accelerations there; before it where tips rest at the end, s."""
     work, memory = solver.work, solver.memory
-    put_start(lane, state.now)
+    for k in range(state.weight.shape[0]):
+        put_lanes(state.now.y, (k,), lanes_at(lane.start, (0, k)))
+        put_lanes(state.now.u, (k,), lanes_at(lane.start, (1, k)))
     turn_bases(system.joint_table, work.base, state.now.y)
-    motions_at(lane.motions, all_lanes(0.0), all_lanes(0.0), work.piece, work.motions)
-    for b in range(system.tree.shape[0]):  # those that rest are followed once
-        follow_frame(system, lane, b, state.now, work)
+    for k in range(state.weight.shape[0]):
+        put_lanes(state.earlier, (k,), lanes_at(state.now.y, (k,)))
     everyone = lanes_at(lane.step, (0,)) > 0.0
-    if system.settles:
-        copy(work.motions, solver.before)
-        settle(system, lane, everyone, state, solver)
-        copy(solver.before, work.motions)
+    for time, needed in ((end, system.bands.shape[1] > 0), (0.0 * end, system.settles)):
+        motions_at(lane.motions, time, time, work.piece, work.motions)
+        for b in range(system.tree.shape[0]):  # those that rest are followed once
+            follow_frame(system, lane, b, state.now, work)
+        if needed:
+            copy(work.motions, solver.before)
+            settle(system, lane, everyone, state, solver)
+            copy(solver.before, work.motions)
+        if system.bands.shape[1] and not everywhere(time <= 0.0):
+            note_rest(system, state, solver, left)
+            for k in range(state.weight.shape[0]):
+                put_lanes(state.now.y, (k,), lanes_at(state.earlier, (k,)))
+    for k in range(state.weight.shape[0]):
+        put_lanes(state.earlier, (k,), all_lanes(0.0))
     put_lanes(memory, (EVENT,), near_of(lane))
     next_events(lane.events, everyone, memory)
     solve_accelerations(system, lane, everyone, state, solver)
@@ -259,9 +256,7 @@ def march_block(system, lane, scheme, steps, block, room, record):
     """One block of lanes from the start to the end, its signals and codes into the record."""
     state, solver, signals, past, left = room
     work, memory, kept = solver.work, solver.memory, 0
-    if system.bands.shape[1]:
-        come_to_rest(system, lane, steps * lanes_at(lane.step, (0,)), state, solver, left)
-    start(system, lane, state, solver)
+    start(system, lane, steps * lanes_at(lane.step, (0,)), state, solver, left)
     for number in range(steps + 1):
         if number:
             go_through(system, lane, scheme, number, state, solver)
