@@ -186,7 +186,7 @@ _MEANT = by_other_names(
     ("timed-move", "move-in-time move-time timed"),
     ("cruise", "constant-speed constant linear uniform"),
     ("rigid", "mass rigid-body lump payload"),  # of a body; "mass" is a carriage
-    ("waypoints", "timed-move cycloidal rest-to-rest"),  # of a joint; a carriage has timed-move itself
+    ("waypoints", "cycloidal rest-to-rest"),
 )
 
 # what others call a number -> its key; of several the first that is there

@@ -123,6 +123,19 @@ class Move(TimeMotion):
         return move_pieces(number("start"), number("end"), number)
 
 
+class TimedMove(TimeMotion):
+    """From rest at the start to rest at the end in so many seconds, the jerk constant in each quarter of them."""
+
+    kind: Literal["timed-move"]
+    start: Dimensionless = 0.0
+    end: Dimensionless
+    time: Time = Field(gt=0)
+
+    def pieces(self, number: Number) -> Array:
+        start, end = number("start"), number("end")
+        return move_pieces(start, end, reached_in(np.abs(end - start), number("time")).__getitem__)
+
+
 class Points(TimeMotion):
     """The C2 cubic spline through values at times, at rest at both ends; it stays at the last."""
 
@@ -161,6 +174,7 @@ MoveTurn = _of_a_joint(
     acceleration=(Annotated[AngularAcceleration, Field(gt=0)], ...),
     jerk=(Annotated[AngularJerk, Field(gt=0)] | None, None),
 )
+TimedTurn = _of_a_joint(TimedMove, "Turn", start=(Angle, 0.0), end=(Angle, ...))
 PointsTurn = _of_a_joint(Points, "Turn", values=(Annotated[Several[Angle], TWO_OR_MORE], ...))
 SteadySlide = _of_a_joint(Steady, "Slide", start=(Length, 0.0), rate=(Speed, ...))
 SwingSlide = _of_a_joint(Swing, "Slide", centre=(Length, 0.0), amplitude=(Length, ...))
@@ -174,17 +188,23 @@ MoveSlide = _of_a_joint(
     acceleration=(Annotated[Acceleration, Field(gt=0)], ...),
     jerk=(Annotated[Jerk, Field(gt=0)] | None, None),
 )
+TimedSlide = _of_a_joint(TimedMove, "Slide", start=(Length, 0.0), end=(Length, ...))
 PointsSlide = _of_a_joint(Points, "Slide", values=(Annotated[Several[Length], TWO_OR_MORE], ...))
 
 _TURNING, _SLIDING = "motion of a joint that turns", "motion of a joint that slides"
-_TURNS = SteadyTurn, SwingTurn, SpinUpTurn, PointsTurn, MoveTurn
-_SLIDES = SteadySlide, SwingSlide, SpinUpSlide, PointsSlide, MoveSlide
+_TURNS = SteadyTurn, SwingTurn, SpinUpTurn, PointsTurn, MoveTurn, TimedTurn
+_SLIDES = SteadySlide, SwingSlide, SpinUpSlide, PointsSlide, MoveSlide, TimedSlide
 TURNING = kinds(_TURNING, "wanderlast.turning_motions", TimeMotion, *_TURNS)
 SLIDING = kinds(_SLIDING, "wanderlast.sliding_motions", TimeMotion, *_SLIDES)
 COURSES = kinds("course of a load", "wanderlast.courses", TimeMotion, Steady, Swing, Points)
 AnyTurning = Annotated[TimeMotion, KindOf(_TURNING, TURNING)]
 AnySliding = Annotated[TimeMotion, KindOf(_SLIDING, SLIDING)]
 AnyCourse = Annotated[TimeMotion, KindOf("course of a load", COURSES)]
+
+
+def reached_in(way: Any, time: Any) -> dict[str, Any]:
+    """What a move over a way in a time reaches, which it takes as limits: 2 D/T, 8 D/T^2 and 32 D/T^3."""
+    return {"speed": 2.0 * way / time, "acceleration": 8.0 * way / time**2, "jerk": 32.0 * way / time**3}
 
 
 def move_pieces(start: Array, end: Array, number: Number) -> Array:

@@ -6,14 +6,14 @@ import math
 from abc import abstractmethod
 from collections.abc import Mapping
 from functools import cached_property, lru_cache
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field
 
 from engine.scene.motions.base import Array, BetweenPlaces, Path, Side, both_places, two_places
-from engine.scene.motions.of_joints import Number, move_pieces
+from engine.scene.motions.of_joints import Number, move_pieces, reached_in
 from engine.scene.motions.profile import PHASES, Profile, profile
 from engine.study_file.checks import Check, on_body
 from engine.study_file.units import Acceleration, Jerk, Speed, Time
@@ -148,17 +148,12 @@ class TimedMove(FromRestToRest):
 
     def pieces(self, number: Number) -> Array:
         start, end = both_places(number)
-        return move_pieces(start, end, _limits(np.abs(end - start), number("time")).__getitem__)
+        return move_pieces(start, end, reached_in(np.abs(end - start), number("time")).__getitem__)
 
     @cached_property
     def _move(self) -> Profile:
         way = abs(self.end - self.start)
-        return profile(way, **_limits(way, self.time))
-
-
-def _limits(way: Any, time: Any) -> dict[str, Any]:
-    """What a move in a time reaches, which it takes as limits."""
-    return {"speed": 2.0 * way / time, "acceleration": 8.0 * way / time**2, "jerk": 32.0 * way / time**3}
+        return profile(way, **reached_in(way, self.time))
 
 
 @lru_cache(maxsize=256)

@@ -113,6 +113,9 @@ def test_sensors_of_drives_have_a_joint_and_no_place(sensor: Any) -> None:
         driven([TURNS | {"motion": SWING}], sensor)
 
 
+IN_TIME = {"kind": "timed-move", "time": 0.3}
+
+
 @pytest.mark.parametrize("jerk", [None, 60.0])
 def test_a_joint_moves_from_point_to_point_as_a_carriage_does(jerk: float | None) -> None:
     """Angles, and the torque by their accelerations, in variants with limits of their own; it stays at the end."""
@@ -132,8 +135,25 @@ def test_a_joint_moves_from_point_to_point_as_a_carriage_does(jerk: float | None
         assert torque[-1] == pytest.approx(0.0, abs=1e-12)
 
 
-def test_a_joint_whose_ends_are_one_stands_still() -> None:
-    move = {"kind": "point-to-point", "start": 0.2, "end": 0.2, "speed": 1.0, "acceleration": 8.0}
+def test_a_joint_moves_in_a_time() -> None:
+    """The torque by the acceleration that rises and falls by a constant jerk in each quarter, in variants of their
+    own."""
+    move = {"kind": "timed-move", "start": 0.2, "end": -0.7, "time": 1.0}
+    study = driven([TURNS | {"motion": move}], TORQUE, gravity=0.0)
+    seconds = np.array([0.6, 1.2])
+    values = VariantValues(study, {"frame.arm.joints.0.motion.time": seconds}, 2)
+    found = march(build(study), values, np.full(2, 1.5), 600, np.arange(601), AVERAGE)
+    inertia = INERTIA + MASS * (0.5 * LENGTH) ** 2
+    for v, time in enumerate(seconds):
+        part = found.times[v] / time
+        most = 8.0 * -0.9 / time**2
+        wanted = inertia * most * np.interp(part, [0.0, 0.25, 0.75, 1.0], [0.0, 1.0, -1.0, 0.0])
+        assert found.history[v, :, 0] == pytest.approx(wanted, abs=1e-9)
+
+
+@pytest.mark.parametrize("more", [{"kind": "point-to-point", "speed": 1.0, "acceleration": 8.0}, IN_TIME])
+def test_a_joint_whose_ends_are_one_stands_still(more: dict[str, Any]) -> None:
+    move = {"start": 0.2, "end": 0.2} | more
     model, marched = steps(driven([TURNS | {"motion": move}], TORQUE), 0.5, 50)
     wanted = MASS * GRAVITY * 0.5 * LENGTH * np.cos(0.2)
     assert np.abs(history(model, marched, "sensors")[:, 0]) == pytest.approx(wanted, rel=1e-12)
