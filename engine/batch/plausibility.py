@@ -34,7 +34,7 @@ FAST = 3.0  # times the critical speed
 RACING = 150.0  # m/s: trains have run at 160, machines at 10; km/h read as m/s begin with 200
 HEAVY = 4.0  # times the body's mass: a head of a machine tool weighed 2.2 times its beam, and was asked about
 LONG = 100.0  # times the body's length: a way
-DEEP = 0.1  # of the length: a static deflection beyond linear bending
+DEEP = 0.07  # of the length: a static deflection beyond linear bending, and of most materials
 # Of the weight of the body that carries them, in the heaviest variant: loads together. Trains and tables press with 5 %
 # to five times of it (those of built-in studies with 14 to 85 %), with a thousandth where kN were written as N. People
 # on footbridges and small tools are as light in truth: what is written with its unit is believed.
@@ -272,7 +272,10 @@ def _deep(plan: Plan) -> Iterator[str]:
             "are the units of stiffness, length and load right?"
         )
     elif worst > DEEP:
-        yield f"the static deflection alone reaches {worst:.3g} of the length: beyond small-deflection theory"
+        yield (
+            f"the static deflection alone reaches {worst:.3g} of the length: beyond small-deflection theory; are the "
+            "units of load and stiffness right?"
+        )
 
 
 def _light(plan: Plan) -> Iterator[str]:
