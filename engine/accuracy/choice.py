@@ -112,7 +112,8 @@ class Cheapest(NamedTuple):
         """By what pilots tell. cost (columns x cuts,), held (columns x cuts, P) of rungs, infinite where no pilot was
         on them."""
         ranked = np.argsort(cost, kind="stable").astype(np.int32)
-        ranked = ranked[np.any(np.isfinite(held[ranked]), axis=1)]
+        known = np.any(np.isfinite(held[ranked]), axis=1)
+        ranked = ranked[known | ~known.any()]  # all of them where no pilot has values anywhere
         worth = max(1, int(np.count_nonzero(cost[ranked] <= MOST_UNHELD)))
         wanted, slopes = (np.ascontiguousarray(part[..., ranked]) for part in (errors.wanted, errors.held_slopes))
         return cls(errors, wanted, slopes, ranked, worth)
