@@ -26,7 +26,7 @@ ALIKE = 1e-3  # of a time: by so much the best motion may differ and count as th
 MOST_BEST = 4  # values of a swept number of which each is told its best motion
 LAST = 8  # values along a swept number that are looked at: where it is swept too coarsely most of them turn
 FEWEST = 6  # of these
-NEVER = "no motion settles"
+NEVER = "no motion has settled when the run ends"
 LEAST_STEP = 0.1  # of the largest value: smaller ones do not count as up or down
 
 
@@ -147,7 +147,7 @@ def _until(results: Results, sensors: Sequence[str]) -> str:
         return f"{names}: {shortest}"
     lost = int((np.isnan(Times.until_all(results, sensors).values) & results.with_values).sum())
     of = counted(int(results.with_values.sum()), "variant")
-    rest = f"; {lost:,} of {of} {'do' if lost > 1 else 'does'} not settle"
+    rest = f"; {lost:,} of {of} {'have' if lost > 1 else 'has'} not settled when the run ends"
     until = f"Until {f'all of {names} have' if len(sensors) > 1 else f'{names} has'} settled, "
     return f"{until}{shortest}{rest if lost else ''}"
 
@@ -268,7 +268,7 @@ def _shortest(results: Results, sensors: Sequence[str]) -> str:
     end = f", at the worst {listed(worst)}" * bool(worst) + f", whatever {listed(sorted(same))}" * bool(same)
     if not found:
         return f"{NEVER}{end}"
-    return f"move and settling take at least {listed(found)}{end}{f'; no motion settles at {never}' * bool(never)}"
+    return f"move and settling take at least {listed(found)}{end}{f'; {NEVER} at {never}' * bool(never)}"
 
 
 def _changes_best(results: Results, values: Array, given: Sequence[Axis], axis: Axis) -> float:

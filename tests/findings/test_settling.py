@@ -73,14 +73,14 @@ def test_the_best_motion_is_told_for_each_mass_and_way_at_the_worst_damping() ->
     said = answers.answer(found)[0]
     plain = re.sub(r" ± \S+ \S+", "", said)
     assert (
-        "(zeta 0.06), at the worst way and push; no motion settles at zeta 0.02; 21 of 60 variants do not settle."
-        in plain
+        "(zeta 0.06), at the worst way and push; no motion has settled when the run ends at "
+        "zeta 0.02; 21 of 60 variants have not settled when the run ends." in plain
     )
     for way, push, zeta in ((0, 0, 0), (1, 0, 1), (0, 1, 2), (1, 1, 0)):
         known[:, way, push, zeta] = np.nan
     found["midspan_move_and_settle_time"] = times.copy(data=known)
     said = answers.answer(found)[0]
-    assert said == "midspan: no motion settles, at the worst zeta."
+    assert said == "midspan: no motion has settled when the run ends, at the worst zeta."
     known = np.random.default_rng(5).permutation(times.size).reshape(times.shape) / 1000.0 + 1.0
     known[:, :, :, :] = known[:, :1, :, :1]
     known[:, :, 1] = 1.5 * known[:, :, 0]
@@ -109,7 +109,9 @@ def test_of_several_sensors_the_time_is_told_until_all_have_settled() -> None:
         "Until all of middle and near have settled, move and settling take 4 s"
     )
     assert (
-        told[0].endswith(f"at least at acceleration {STEPS[1]} m/s²; 1 of 5 variants does not settle.")
+        told[0].endswith(
+            f"at least at acceleration {STEPS[1]} m/s²; 1 of 5 variants has not settled when the run ends."
+        )
         and "± 2 s" not in told[0]
     )
     assert not any("; move and settling" in text for text in answers.answer(found))
