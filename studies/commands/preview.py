@@ -33,6 +33,7 @@ from studies.protocol.parts import Foreseen, Pieces, TextTable, Variants
 from studies.results.axes import Axis
 from studies.results.findings_common import has_dampers, told_trains
 from studies.results.formatting import (
+    Scale,
     counted,
     duration,
     number,
@@ -44,6 +45,7 @@ from studies.results.formatting import (
 
 FREQUENCIES_SHOWN = 6
 STANDS = 33  # places of a carriage's way
+JUST_BEYOND = 1.1  # times the highest speed of a sweep, up to which a resonance is felt at it
 
 
 @dataclass(frozen=True)
@@ -305,11 +307,13 @@ def _in_step(plan: Plan) -> Iterator[TextTable]:
         speeds = np.concatenate([grid.values.speed(axle) for grid in plan.grids])
         between, typed = (float(speeds.min()), float(speeds.max())), typed_speed(study, axle)
         one_speed, body = between[0] == between[1], bodies[f"/model/{train.on}"]
-        found = [] if one_speed else speeds_in_step(study, name, body, between, readers)
-        most = max(found, key=lambda one: one.swing, default=None)
+        looked = (between[0], JUST_BEYOND * between[1])
+        found = [] if one_speed else speeds_in_step(study, name, body, looked, readers)
+        within = [one for one in found if one.speed <= between[1]]
+        most = max(within, key=lambda one: one.swing, default=None)
         rows = [
             (
-                quantity(one.speed, "m s-1") if typed is None else f"{number(one.speed * typed.factor)} {typed.unit}",
+                _of_speed(one.speed, typed) + ", beyond" * (one.speed > between[1]),
                 f"{number(one.frequency)} Hz",
                 quantity(one.way, "m"),
                 percent(one.part),
@@ -322,6 +326,10 @@ def _in_step(plan: Plan) -> Iterator[TextTable]:
         yield TextTable(
             heading, ("speed", "frequency", "way in a period", "part of its load", "swing of its mode"), rows
         )
+
+
+def _of_speed(speed: float, typed: Scale | None) -> str:
+    return quantity(speed, "m s-1") if typed is None else f"{number(speed * typed.factor)} {typed.unit}"
 
 
 def _ratios_of(grid: SceneGrid, name: str) -> Iterator[tuple[str, Array]]:
