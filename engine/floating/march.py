@@ -12,9 +12,9 @@ from engine.floating.lanes import in_blocks, lanes, out_of_blocks
 from engine.kernels.floating import layout
 from engine.kernels.floating.layout import Lane, Record, Weights
 from engine.kernels.floating.march import march as march_lanes
-from engine.kernels.floating.observe import CONTACT_FORCE, OF_CARRIAGE
+from engine.kernels.floating.observe import BODY_ATTITUDE, CONTACT_FORCE, OF_BODY, OF_CARRIAGE
 from engine.kernels.layout import LANES
-from results_schema.arrays import Array, Counts
+from results_schema.arrays import Array, Counts, Mask
 from results_schema.gravest_status import gravest
 from results_schema.status import Fidelity, Status
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from engine.floating.model import FloatingModel
     from engine.scene.variants import VariantValues
 
+LEAST_WEIGHT = 0.02  # of it: what presses less, on tracks within a degree of upright, does not lie on them
 STATUS = np.array([Status.OK, Status.NOT_CONVERGED, Status.DIVERGED, Status.SEPARATED], dtype=np.int8)
 
 
@@ -66,11 +67,19 @@ def march(
     kept = statistics, history, settled, codes, last
     march_lanes(system, in_lanes, scheme, steps, Record(np.asarray(stations), *kept))
     statistics, history, settled, codes, last = (out_of_blocks(part, V) for part in kept)
-    # without gravity nothing lies on a track: it holds what moves on it
-    heavy = table.gravity[:, 2] > 0.0
     first = model.signal_of("carriages") + CONTACT_FORCE
-    lifts = heavy & (
-        statistics[:, first : model.signal_of("ends") : OF_CARRIAGE, layout.SMALLEST].min(axis=1, initial=0.0) < 0.0
-    )
+    pulls = statistics[:, first : model.signal_of("ends") : OF_CARRIAGE, layout.SMALLEST] < 0.0
+    lifts = np.any(pulls & _lies(model, table.gravity, history[:, 0]), axis=1)
     status = gravest(STATUS[codes], np.where(lifts, np.int8(Status.SEPARATED), np.int8(Status.OK)))
     return Marched(statistics, history, stations * h[:, None], status, h, last, table.stops, settled)
+
+
+def _lies(model: FloatingModel, gravity: Array, signals: Array) -> Mask:
+    """(V, C) whether weight presses carriages onto their tracks, by the signals (V, ...) at time 0. Without gravity,
+    and where they stand upright, these hold what moves on them from both sides."""
+    names, frames = list(model.bodies), model.signal_of("frames") + BODY_ATTITUDE
+    first = [frames + OF_BODY * names.index(carriage.on) for carriage in model.study.carriage.values()]
+    normal = np.stack([signals[:, np.add.outer(first, 3 * i + 2).astype(int)] for i in range(3)], axis=2)
+    return np.asarray(
+        np.einsum("vi,vci->vc", gravity, normal) > LEAST_WEIGHT * np.linalg.norm(gravity, axis=1)[:, None]
+    )

@@ -84,3 +84,13 @@ def test_who_sweeps_the_motion_of_a_joint_that_has_none_is_told() -> None:
     loose = driven(joints=[{"kind": "revolute", "axis": [0, 1, 0]}], sweep=swept)
     with pytest.raises(BadInput, match=r"no such number.*is frame\.arm\.joints\.0\.motion missing\?"):
         expand(loose)
+
+
+@pytest.mark.parametrize(("turned", "lifts"), [(0.0, True), (30.0, True), (89.5, False), (90.0, False)])
+def test_a_mast_holds_its_lift_from_both_sides(turned: float, lifts: bool) -> None:
+    """What its foot's acceleration tears off a lying track is only pulled back by one that stands upright."""
+    shaken = {"kind": "prismatic", "axis": [0, 0, 1], "motion": {"kind": "swing", "amplitude": 0.5, "frequency": 1.5}}
+    frame = {"arm": {"turned": [0, f"{turned} deg", 0], "joints": [shaken]}}
+    found = studies.run(driven(frame=frame, gravity=9.81, question={"duration": 0.9}))
+    assert found["trolley_contact_force_min"] < 0.0
+    assert (found["status"] == Status.SEPARATED) == lifts
