@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from engine.bodies.modal.outline import HELD_AT, Outline
+from engine.bodies.modal.outline import HELD_AT
 from engine.model.distinct_models import base_scene
 from engine.model.lane_table import moving_mass, weight
 from engine.model.scene_model import SceneModel
@@ -40,6 +40,7 @@ from studies.results.formatting import number, percent, quantity, spanned, swept
 PAGE = "drawing.html"
 SHOWN = 6  # modes
 PROBED = 33  # places along a way at which a weight is set down
+ROUNDING = 1e-9  # of lengths
 _HELD = {frozenset(ways): word for word, ways in HELD_AT.items()}
 
 
@@ -181,7 +182,7 @@ def _bodies(scene: Layout) -> Table:
                 name,
                 kind,
                 f"{number(modal.length, 4)} m",
-                _extent(body.outline),
+                _extent(body),
                 quantity(modal.mass, "kg", 4),
                 stiffness,
                 first,
@@ -201,8 +202,9 @@ def _bodies(scene: Layout) -> Table:
     return Table("Bodies", headings, rows)
 
 
-def _extent(outline: Outline) -> str:
-    points = np.concatenate([line.points for line in outline.every_line])
+def _extent(body: Placed) -> str:
+    points = body.at(np.concatenate([line.points for line in body.outline.every_line]))
+    points[np.abs(points) < ROUNDING * np.abs(points).max()] = 0.0
     return " x ".join(number(float(size), 4) for size in np.ptp(points, axis=0)) + " m"
 
 
@@ -286,7 +288,10 @@ def _carriages(scene: Layout, study: Study) -> Table:
         carriage, modal = model.study.carriage[tie.name], model.bodies[tie.body].modal
         force, (low, high) = float(weight(model, values, index)[0]), carriage.motion.range()
         s = np.linspace(max(low, 0.0), min(high, modal.length), PROBED)
-        sag = "" if modal.rigid_modes else quantity(float(np.abs(modal.influence_at(s, s)).max()) * abs(force), "m")
+        across = abs(float(scene.bodies[carriage.on].axes[2, 2])) if carriage.on in scene.bodies else 1.0
+        sags = not modal.rigid_modes and across > ROUNDING  # not where it stands upright
+        deflection = across * float(np.abs(modal.influence_at(s, s)).max()) * abs(force) if sags else 0.0
+        sag = quantity(deflection, "m") if sags else ""
         if sag and len(carriage.riding_contacts) > 1:  # which share it
             sag += " of its weight at one point"
         way = f"{number(low, 4)} to {number(high, 4)} m, {carriage.motion.kind}"
