@@ -204,11 +204,14 @@ def _held(study: Study, reads: Sensor | Envelope, own: float | str | None) -> tu
 
 
 def deciding(results: tuple[Result, ...], tolerance: float) -> tuple[Result, ...]:
-    """The results by which it is decided what is computed with: those that are held, else all but places, as if they
-    were held to ``tolerance``."""
+    """The results by which it is decided what is computed with: those that are held, else all as if they were held to
+    ``tolerance``, but for places and times of settling, which jump, and contact forces beside anything else."""
     if any(np.isfinite(result.tolerance) for result in results):
         return results
-    return tuple(r if r.name.endswith("_position") else r._replace(tolerance=tolerance, follows=True) for r in results)
+    jump = ("_position", *names_of_times(""))
+    left_out = (*jump, *(f"_contact_force_{end}" for end in ENDS))
+    left_out = jump if all(result.name.endswith(left_out) for result in results) else left_out
+    return tuple(r if r.name.endswith(left_out) else r._replace(tolerance=tolerance, follows=True) for r in results)
 
 
 def tolerances(results: tuple[Result, ...]) -> Array:
