@@ -31,8 +31,16 @@ def ties_of(model: SceneModel, active: Sequence[bool]) -> Counts:
     off theirs push nothing. No table is without any, so the first one stays where all are."""
     on = [any(active[load.rider] for load in carriage.loads) for carriage in model.carriages]
     on[0] |= not any(on)
-    others = [True] * (model.first_push - len(on))
-    return np.flatnonzero([*on, *others, *(active[push.carriage] for push in model.pushes)])
+    springs = (active[spring.rider] or not _passes_unread(model, spring) for spring in model.springs)
+    pushes = (active[push.carriage] for push in model.pushes)
+    return np.flatnonzero([*on, *(True for _ in model.dampers), *springs, *pushes])
+
+
+def _passes_unread(model: SceneModel, spring: SpringTie) -> bool:
+    """Whether nothing tells of a sprung mass before it comes, when it is at rest, and after it has left for good."""
+    name = model.carriages[spring.carriage].name
+    read = any(sensor.carriage == name for sensor in model.study.sensor.values())
+    return spring.mode is not None and not read and model.study.carriage[name].motion.passes
 
 
 class TieRows(NamedTuple):

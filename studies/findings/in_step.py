@@ -29,7 +29,7 @@ from studies.results.results import Results
 LOOKED_AT, TOLD_IN_STEP, BEYOND_CHANCE = 4096, 0.3, 1.3
 #: Beside a resonance of n coaches a fifth of it comes in step at 1.4 times the speed by which its way leaves one more
 #: or less of them on the train's length, and less further on: so many of these, where another peak is so much larger.
-LOBES, OVER_LOBES = 4.0, 3.0
+LOBES, OVER_LOBES = 4.0, 4.0
 FEWEST = 3  # axles, or loads in a row: what one or two pushes leave is no resonance
 MODES, MOST = 4, 8  # that are looked at, the lowest that move the track; speeds that are told
 WAYS = 4.0  # lengths of a train: the wave along which its axles push the least together is shorter
