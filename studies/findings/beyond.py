@@ -13,7 +13,7 @@ from engine.study_file.units import Acceleration, Dimensionless, Force, Length, 
 from results_schema.arrays import Array, Mask
 from studies.findings.amplification import largest, sizes
 from studies.protocol.study import kind_named, question_of
-from studies.results.axes import PACES, VARIANT, Axis
+from studies.results.axes import DIRECTION, PACES, VARIANT, Axis
 from studies.results.findings_common import LOOSE
 from studies.results.formatting import counted, listed, number, percent, quantity
 from studies.results.results import Results
@@ -210,7 +210,12 @@ def where(results: Results, beyond: Mask, axis: Axis | None) -> str:
     alike = {text: [others[0].in_words(value) for value in told if told[value] == text] for text in told.values()}
     if len(alike) == 1:
         return next(iter(alike))
-    return "; ".join(f"{text} ({others[0].noun} {listed(values)})" for text, values in alike.items())
+    last = sorted(alike.items(), key=lambda item: item[0].startswith("nowhere"))
+    return "; ".join(f"{text} ({others[0].noun} {listed(values)})" for text, values in last)
+
+
+def _everywhere(axis: Axis) -> str:
+    return "both ways" if axis.sets(DIRECTION) else f"everywhere from {axis.span}"
 
 
 def _has_samples(results: Results, axis: Axis) -> bool:
@@ -224,7 +229,7 @@ def _in_parts(results: Results, axis: Axis, beyond: Mask) -> str:
     own, known = results.everywhere(results.dataset[axis.name]), results.with_values
     parts = {float(value): beyond[(own == value) & known].mean() for value in np.unique(own[known])}
     if {*parts.values()} == {1.0}:
-        return f"everywhere from {axis.span}"
+        return _everywhere(axis)
     told = [f"at {axis.in_words(value)} in {percent(part)}" for value, part in parts.items()]
     return f"{listed(told)} of the variants"
 
@@ -264,11 +269,11 @@ def _along(results: Results, axis: Axis, beyond: Mask, among: Mask | None = None
     places = np.unique(along)
     over = np.isin(places, along[beyond])
     if not over.any():
-        return f"nowhere from {axis.span}"
+        return "neither way" if axis.sets(DIRECTION) else f"nowhere from {axis.span}"
     steps = _steps(places)
     apart = np.flatnonzero(over[:-1] & over[1:] & (steps > GAP * np.median(steps)))
     if over.all() and not apart.size:
-        return f"everywhere from {axis.span}{_common(results, axis, beyond) if among is None else ''}"
+        return f"{_everywhere(axis)}{_common(results, axis, beyond) if among is None else ''}"
     turns = np.flatnonzero(np.diff(over, prepend=False, append=False))
     bounds = np.sort(np.concatenate([turns, apart + 1, apart + 1]))
     parts = [places[first:end] for first, end in zip(bounds[::2], bounds[1::2], strict=True)]

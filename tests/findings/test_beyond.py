@@ -142,6 +142,13 @@ def part_of(values: str, exceeded: list[list[bool]]) -> str:
     return where_beyond(results, np.array(exceeded, dtype=np.float64), 0.5, results.axes[0])
 
 
+@pytest.mark.parametrize(("exceeded", "words"), [((1, 1), "both ways"), ((0, 0), "neither way"), ((0, 1), "backward")])
+def test_ways_are_told_as_ways(exceeded: tuple[int, int], words: str) -> None:
+    swept = 'way = { of = "carriage.table.motion.direction", values = ["forward", "backward"] }'
+    results = Results.of(scenes.run("passage", swept))
+    assert words in where_beyond(results, np.array(exceeded, dtype=np.float64), 0.5, results.axes[0])
+
+
 def test_not_every_combination_is_told() -> None:
     """Each mass exceeds it at some speed, and none at all of them."""
     none, some, full = [False] * 5, [True, True, False, False, False], [True] * 5
