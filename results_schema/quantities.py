@@ -78,6 +78,7 @@ _ROWS = (
     Quantity("position_error", "m", of_arm=True, meant=("tip-error", "path-error", "deviation", "tracking-error")),
     Quantity("drive_torque", "N m", of_drive=True, told=True, meant=("torque", "joint-torque", "motor-torque")),
     Quantity("drive_force", "N", of_drive=True, told=True, meant=("joint-force", "motor-force")),
+    Quantity("rotation", "rad", 1, meant=("end-rotation", "angle", "tilt")),
     Quantity("velocity", "m s-1", rate=1, of_mass=True, told=True),
     Quantity("acceleration", "m s-2", rate=2, of_mass=True, told=True),
     Quantity("bending_moment", "N m", 2, factor=_bending, of_section=True, meant=("moment",)),

@@ -9,7 +9,7 @@ from pydantic import Field
 from engine.scene.sensors import Sensor
 from engine.scene.study import Study
 from engine.study_file.spec import Spec
-from engine.study_file.units import Acceleration, Dimensionless, Force, Length, Pressure, Speed, Time, Torque
+from engine.study_file.units import Acceleration, Angle, Dimensionless, Force, Length, Pressure, Speed, Time, Torque
 from results_schema.arrays import Array, Mask
 from studies.findings.amplification import largest, sizes
 from studies.protocol.study import kind_named, question_of
@@ -27,7 +27,7 @@ NEARLY, CLOSE = 0.9, 0.99  # of a limit that is exceeded nowhere, or not beside:
 UNLIKE = 1e-4  # of a limit: what stays below is a limit in another unit, such as 3 for 3 um
 LIMIT = " Its absolute value exceeds "
 LIMITED = (
-    *("displacement", "velocity", "acceleration", "bending_moment", "stress", "support_reaction"),
+    *("displacement", "rotation", "velocity", "acceleration", "bending_moment", "stress", "support_reaction"),
     *("position_error", "drive_torque", "drive_force"),
 )
 
@@ -36,6 +36,7 @@ class Limits(Spec):
     """Of sensors' readings, by their quantity."""
 
     displacement: Annotated[Length, Field(gt=0)] | None = None
+    rotation: Annotated[Angle, Field(gt=0)] | None = None
     velocity: Annotated[Speed, Field(gt=0)] | None = None
     acceleration: Annotated[Acceleration, Field(gt=0)] | None = None
     bending_moment: Annotated[Torque, Field(gt=0)] | None = None

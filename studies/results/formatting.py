@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 MINUS = "\N{MINUS SIGN}"
-_PREFIXED = ("m", "N", "N m", "Pa", "J")
+_PREFIXED = ("m", "N", "N m", "Pa", "J", "rad")
+SMALL_TURN = 0.1  # rad: what turns farther is no slope
 NOISE = 1e-12  # of the largest value beside it: what is smaller is rounding
 ROUNDING = 1e-9  # of the scale of a result: what a long march leaves of what is nothing
 ALIKE = 1e-6  # of the largest value: a smaller range of values is rounding
@@ -91,7 +92,8 @@ def scale_for(largest: float, units: str) -> Scale:
     >>> scale_for(0.0123, "m"), scale_for(2.5e4, "N"), scale_for(3.0, "m s-2")
     (Scale(factor=1000.0, unit='mm'), Scale(factor=0.001, unit='kN'), Scale(factor=1.0, unit='m/s²'))
     """
-    if units not in _PREFIXED or not math.isfinite(largest) or largest <= 0.0:
+    turned = units == "rad" and largest > SMALL_TURN
+    if units not in _PREFIXED or turned or not math.isfinite(largest) or largest <= 0.0:
         return Scale(1.0, unit_text(units))
     known = _METRES if units == "m" else tuple(_PREFIXES)
     exponent = 3 * math.floor(math.log10(largest) / 3.0 + 1e-12)
