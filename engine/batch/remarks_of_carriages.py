@@ -22,6 +22,7 @@ SHORT = 0.5  # of the length of the body: a way of a load that passes; cranes' a
 WIDE = 0.01  # of the length: a band of settling; cranes sag by a 500th at most, all of which lies within
 SLOW = 0.1  # Hz, of a mass on its spring: vehicles swing at 0.5 to 20 Hz, and at a thirtieth of that on N/m for kN/m
 FARTHEST = 100.0  # m from axle to axle: those of the longest wagons stand 20 m apart
+NEXT_TO_NO_DAMPING = 1e-4  # of critical: springs of steel alone have more; as a ratio is a number of N s/m
 _THOUSANDTHS = re.compile(r"(?<=[\d ./*])m(?:Pa\b|N\b(?=\s*\S))")  # of pascals, and of what loads are not
 BELOW = 1e-9  # relative: a limit that is missed by more is not reached
 
@@ -145,12 +146,17 @@ def swings_slowly(plan: Plan) -> Iterator[str]:
 
 
 def does_not_swing(plan: Plan) -> Iterator[str]:
-    """One sentence for every mass on a spring that is damped beyond swinging."""
+    """One sentence for every mass on a spring that is damped beyond swinging, or next to not at all."""
     for table, (frequencies, ratios) in sprung(plan).items():
         if ratios.max() > 1.0:
             yield (
                 f"the sprung mass of {table.replace('.', ' ')}, of {frequencies.max():.3g} Hz on its spring, is damped "
                 f"by up to {ratios.max():.3g} times what lets it swing: is its mass right, in kg?"
+            )
+        elif 0.0 < ratios.max() < NEXT_TO_NO_DAMPING and not has_unit(plan.study, f"{table}.damping"):
+            yield (
+                f"the sprung mass of {table.replace('.', ' ')} is damped by {ratios.max():.2g} of critical damping: "
+                "its damping is in N s/m; of a damping ratio zeta it is 2 zeta sqrt(stiffness mass)"
             )
 
 

@@ -49,6 +49,7 @@ JERK = "m s-3"
 KNOWN_UNITS = "a unit such as m, mm, kN, GPa, km/h, Hz"
 _RIGID = ("rigid", "fixed", "infinite", "infinity", "inf")
 _RUN_TOGETHER = {"kmh": "km/h", "kph": "km/h", "mps": "m/s", "nm": "N m", "knm": "kN m"}
+_STIFF_IN_BENDING = re.compile(r"[kMG]?Nm(2|\^2|²)")  # which pint takes for the number of a yarn
 _RUN_TOGETHER |= dict.fromkeys(("mu", "my", "µ", "mum"), "um")
 
 
@@ -237,6 +238,13 @@ def _meant_here(number: str, unit: str, wanted: Unit, exponents: tuple[int, int,
         other = re.sub(r"\^?[234]$", power, unit)
         if other != unit and _unit_factor(other)[1] == wanted.exponents:
             return f'did you mean "{number} {other}"?'
+    return _another_quantity(number, unit, wanted, exponents)
+
+
+def _another_quantity(number: str, unit: str, wanted: Unit, exponents: tuple[int, int, int]) -> str:
+    """How what is wanted follows from a number of another quantity, or ""."""
+    if wanted.noun == "pressure" and (exponents == (3, 1, -2) or _STIFF_IN_BENDING.fullmatch(unit)):
+        return 'N m2 is E I, of which each has a key; a beam may have second_moment = "1 m4" with all of it in Pa'
     if unit == "g" and wanted.noun == "acceleration":
         return f'g is gram; {number} g of gravity is "{float(number) * 9.81:.3g} m/s2"'
     if wanted.noun == "stiffness" and exponents == (0, 0, -1):

@@ -111,6 +111,9 @@ CASES = {
     "1.01 Hz on its spring, is damped by up to 3.16 times what lets it swing: is its mass right": passing(
         car=oscillator(1.0, 40.0, WAY, damping=40.0)
     ),
+    "is damped by 1.5e-05 of critical damping: its damping is in N s/m; of a damping ratio zeta it is 2 zeta": passing(
+        car=oscillator(1.0, 1e6, WAY, damping=0.03)
+    ),
     "the force of carriage car is negative, so that it lifts: weights are positive": passing(car=force(-0.1, WAY)),
     "settling_band of sensor place, 20 m, is more than a hundredth of bed: was a smaller unit meant?": passing(
         car=mass(0.1, STOP), output={"residual": True}, sensor={"place": fixed(0.4) | {"settling_band": 20.0}}
