@@ -49,7 +49,7 @@ JERK = "m s-3"
 KNOWN_UNITS = "a unit such as m, mm, kN, GPa, km/h, Hz"
 _RIGID = ("rigid", "fixed", "infinite", "infinity", "inf")
 _RUN_TOGETHER = {"kmh": "km/h", "kph": "km/h", "mps": "m/s", "nm": "N m", "knm": "kN m"}
-_STIFF_IN_BENDING = re.compile(r"[kMG]?Nm(2|\^2|²)")  # which pint takes for the number of a yarn
+_E_TIMES_I, E_TIMES_I = re.compile(r"[kMG]?Nm(2|\^2|²)"), (3, 1, -2)  # pint takes Nm for the number of a yarn
 _RUN_TOGETHER |= dict.fromkeys(("mu", "my", "µ", "mum"), "um")
 
 
@@ -89,7 +89,9 @@ class Unit:
         number, unit = _split(text, self)
         factor, exponents, angle = _unit_factor(unit)
         if exponents != self.exponents or angle not in ((self.angle,) if self.turns else (0, self.angle)):
-            what = f"{_dimension_name(exponents, angle)} where {self.article} is wanted"
+            stiff = exponents == E_TIMES_I or _E_TIMES_I.fullmatch(unit)
+            received = "a bending stiffness (N m2)" if stiff else _dimension_name(exponents, angle)
+            what = f"{received} where {self.article} is wanted"
             remedy = _meant_here(number, unit, self, exponents)
             raise fault(what, expected=self.article, received=shortened(text), remedy=remedy)
         if self.per_turn and angle == 1:
@@ -243,7 +245,7 @@ def _meant_here(number: str, unit: str, wanted: Unit, exponents: tuple[int, int,
 
 def _another_quantity(number: str, unit: str, wanted: Unit, exponents: tuple[int, int, int]) -> str:
     """How what is wanted follows from a number of another quantity, or ""."""
-    if wanted.noun == "pressure" and (exponents == (3, 1, -2) or _STIFF_IN_BENDING.fullmatch(unit)):
+    if wanted.noun == "pressure" and (exponents == E_TIMES_I or _E_TIMES_I.fullmatch(unit)):
         return 'N m2 is E I, of which each has a key; a beam may have second_moment = "1 m4" with all of it in Pa'
     if unit == "g" and wanted.noun == "acceleration":
         return f'g is gram; {number} g of gravity is "{float(number) * 9.81:.3g} m/s2"'

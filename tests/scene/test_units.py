@@ -146,6 +146,10 @@ def test_pint_is_imported_only_for_uncommon_units() -> None:
 
 
 # dimension, text -> what the refusal says, its remedy
+E_TIMES_I = (
+    "a bending stiffness (N m2) where a pressure (Pa) is wanted",
+    'N m2 is E I, of which each has a key; a beam may have second_moment = "1 m4" with all of it in Pa',
+)
 CONFUSED = {
     (Density, "9 t/m"): (
         "a quantity in kg/m where a density (kg/m3) is wanted",
@@ -155,8 +159,8 @@ CONFUSED = {
         "a mass (kg) where an acceleration (m/s2) is wanted",
         'g is gram; 0.35 g of gravity is "3.43 m/s2"',
     ),
-    (Pressure, "8e10 Nm2"): ("a pressure (Pa) is wanted", "N m2 is E I, of which each has a key"),
-    (Pressure, "8e10 N m^2"): ("a pressure (Pa) is wanted", "N m2 is E I, of which each has a key"),
+    (Pressure, "8e10 Nm2"): E_TIMES_I,
+    (Pressure, "8e10 N m^2"): E_TIMES_I,
     (Force, "190 kn"): ("a speed (m/s) where a force (N) is wanted", 'did you mean "190 kN"?'),
     (Stiffness, "190 kn/m"): ("a frequency (Hz) where a stiffness (N/m) is wanted", 'did you mean "190 kN/m"?'),
     (Mass, "3 m"): ("a length (m) where a mass (kg) is wanted", ""),
