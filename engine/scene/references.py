@@ -88,6 +88,9 @@ def _check_sensor(study: Study, name: str, sensor: Sensor) -> None:
         raise study.source.fault(f"{here}.body", what, expected=f'"{body}"', received=received)
     _check_quantity(study, here, body, sensor.quantity)
     if sensor.settling_band is not None and not (study.output.residual or sensor.reads.of_arm):
+        if study.frame:
+            what, expected = "in frames that move a position error alone settles", 'quantity = "position_error"'
+            raise study.source.fault(f"{here}.settling_band", what, expected=expected)
         what, expected = "how long a sensor takes to settle is told of residual vibrations", "[output] residual = true"
         raise study.source.fault(f"{here}.settling_band", what, expected=f"{expected} beside it, or no settling_band")
     if sensor.spot is not None:

@@ -236,15 +236,16 @@ def _in_parts(results: Results, axis: Axis, beyond: Mask) -> str:
 
 
 def _comes_close(results: Results, values: Array, limit: float, axis: Axis | None) -> str:
-    """Where along a swept number values are just below a limit, and none beside them is above it; "" nowhere, and of
-    samples, of which it is told in which part they are above."""
+    """Where along a swept number values are just below a limit, and none there or beside them is above it; "" nowhere,
+    and of samples, of which it is told in which part they are above."""
     if axis is None or axis.dim == VARIANT or (VARIANT in results.dims and _has_samples(results, axis)):
         return ""
     line = np.moveaxis(np.where(results.with_values, values, 0.0), results.dims.index(axis.dim), 0)
     line = line[np.argsort(axis.values)]
     over = np.pad(line > limit, [(1, 1)] + [(0, 0)] * (line.ndim - 1))
     close = (line > CLOSE * limit) & ~(over[:-2] | over[1:-1] | over[2:])
-    places = np.sort(axis.values)[close.reshape(len(line), -1).any(axis=1)]
+    there, beyond = (of.reshape(len(line), -1).any(axis=1) for of in (close, line > limit))
+    places = np.sort(axis.values)[there & ~beyond]
     if not places.size:
         return ""
     return (

@@ -137,5 +137,7 @@ def test_limits_and_bands_of_what_is_not_told_are_refused() -> None:
     given = turned(sensor=without, question={"duration": 1.0, "settling_time": 0.2})
     with pytest.raises(BadInput, match=r"question\.settling_time: .* no sensor has"):
         kind_of(given).check(given)
+    with pytest.raises(BadInput, match="in frames that move a position error alone settles"):
+        turned(sensor={"tip": {"body": "arm", "at": LENGTH, "settling_band": 1e-3}})
     with pytest.raises(BadInput, match="a settling_band is one of displacements"):
         turned(sensor={"tip": {"body": "arm", "at": 0.0, "quantity": "drive_torque", "settling_band": 1e-3}})
