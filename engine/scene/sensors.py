@@ -101,6 +101,9 @@ def _check_direction(sensor: Sensor) -> None:
     elif sensor.side is not None:
         what = f'only what moves with a carriage is read "{sensor.side}" a track'
         raise fault(what, expected='under = "a carriage", or direction: one of x, y, z, or a vector')
+    elif sensor.point is not None:
+        what, expected = "a point is read in the direction that its own table names", "no direction here"
+        raise fault(what, expected=expected, remedy=f"direction in point.{sensor.point} of its body")
     elif not sensor.reads.of_arm and sensor.node is None and sensor.member is None:
         expected = 'node or member = "its name"'
         remedy = 'without direction; where frames move quantity = "position_error" has one'

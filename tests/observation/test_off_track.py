@@ -242,6 +242,7 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "two places": ({"node": "b", "at": 1.0}, r"sensor\.read: a sensor has exactly one place"),
     "no place": ({"direction": "x"}, "exactly one place"),
     "member without a place": ({"member": "left"}, "metres from the member's first node"),
+    "direction of a point": ({"point": "tool", "direction": "x"}, "read in the direction that its own table names"),
     "direction along the track": ({"at": 1.0, "direction": "x"}, "only nodes and members are read in a direction"),
     "direction of a point": ({"point": "knee", "direction": "x"}, "only nodes and members"),
     "unknown axis": ({"node": "b", "direction": "w"}, r"sensor\.read\.direction.*one of x, y, z"),
