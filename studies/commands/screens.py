@@ -273,10 +273,10 @@ def show_comparison(found: Comparison) -> None:
         smallest = ", of what ends in _min the smallest" * any(one.name.endswith("_min") for one in apart)
         table(f"Values of largest size{smallest}", ("result", "first", "second", "they differ most at"), ends)
     if found.only_in_one:
-        paragraphs(f"Only in one of them, or in another shape: {_some(found.only_in_one)}.")
+        paragraphs(f"Only in one of them, or in another shape: {_first_of(found.only_in_one)}.")
     same = [one.name for one in found.differences if not one.largest]
     if same:
-        paragraphs(f"Equal in every variant: {_some(same)}.")
+        paragraphs(f"Equal in every variant: {_first_of(same)}.")
     paragraphs("They agree within their estimated errors." if found.agree else "They differ.")
     if not found.agree and not (found.statuses or found.only_in_one or any(one.beyond for one in apart)):
         paragraphs("Wherever errors are told they explain it.")
@@ -287,7 +287,7 @@ def show_comparison(found: Comparison) -> None:
         )
 
 
-def _some(names: Sequence[str]) -> str:
+def _first_of(names: Sequence[str]) -> str:
     """Names, where they are many the first of them, as of the axles of a train."""
     more = f" and {len(names) - MOST_NAMES:,} more" if len(names) > MOST_NAMES else ""
     return ", ".join(names[:MOST_NAMES]) + more
