@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 BESIDE = ("_position", "_time", "_rms", "_used", "elapsed")  # endings of what `info` lists with --all alone
 LONGEST_LIST = 300  # letters
 MOST_ALIKE = 4  # results that are the same in every variant and told with their value
-MOST_NAMES = 24  # of results that two archives have in common, or not
 RESIDUAL = "_residual"  # ending of residual vibrations
 TALLEST = 4  # lines of a row of that table
 MOST_ROWS = 14  # of the table at the end of a run, which is to stay on the screen
@@ -273,10 +272,10 @@ def show_comparison(found: Comparison) -> None:
         smallest = ", of what ends in _min the smallest" * any(one.name.endswith("_min") for one in apart)
         table(f"Values of largest size{smallest}", ("result", "first", "second", "they differ most at"), ends)
     if found.only_in_one:
-        paragraphs(f"Only in one of them, or in another shape: {_first_of(found.only_in_one)}.")
+        paragraphs(f"Only in one of them, or in another shape: {_some(found.only_in_one)}.")
     same = [one.name for one in found.differences if not one.largest]
     if same:
-        paragraphs(f"Equal in every variant: {_first_of(same)}.")
+        paragraphs(f"Equal in every variant: {_some(same)}.")
     paragraphs("They agree within their estimated errors." if found.agree else "They differ.")
     if not found.agree and not (found.statuses or found.only_in_one or any(one.beyond for one in apart)):
         paragraphs("Wherever errors are told they explain it.")
@@ -285,12 +284,6 @@ def show_comparison(found: Comparison) -> None:
         paragraphs(
             f"Of {listed(blurred)} told errors are larger than the values, so that lying within them says nothing."
         )
-
-
-def _first_of(names: Sequence[str]) -> str:
-    """Names, where they are many the first of them, as of the axles of a train."""
-    more = f" and {len(names) - MOST_NAMES:,} more" if len(names) > MOST_NAMES else ""
-    return ", ".join(names[:MOST_NAMES]) + more
 
 
 def _quantities(found: Difference, *values: float) -> Iterator[str]:
