@@ -34,7 +34,7 @@ FAST = 3.0  # times the critical speed
 RACING = 150.0  # m/s: trains have run at 160, machines at 10; km/h read as m/s begin with 200
 HEAVY = 4.0  # times the body's mass: a head of a machine tool weighed 2.2 times its beam, and was asked about
 LONG = 100.0  # times the body's length: a way
-DEEP = 0.07  # of the length: a static deflection beyond linear bending, and of most materials
+DEEP = 0.07  # of the length: a bed on soft springs sags by 0.06 of it, a beam whose load had a wrong unit by 0.083
 # Of the weight of the body that carries them, in the heaviest variant: loads together. Trains and tables press with 5 %
 # to five times of it (those of built-in studies with 14 to 85 %), with a thousandth where kN were written as N. People
 # on footbridges and small tools are as light in truth: what is written with its unit is believed.

@@ -17,12 +17,14 @@ if TYPE_CHECKING:
     from engine.floating.march import Marched
     from engine.floating.model import FloatingModel
 
+RIGID = 1e-6  # of the highest frequency: what is lower is held by nothing, and rounding
 SWINGS = 2.0  # longest periods before the end, in which nothing may leave a band: a variant's own may be longer
 
 
 class Settled(NamedTuple):
     """When tips have settled. times (V,) s by result: after the stop, and since time 0; NaN where that is too near to
-    the end, as it may swing out again. other_bands (V, 2, W) by sensor: the former in wider and narrower bands."""
+    the end, as it may swing out again, or no equilibrium is found. other_bands (V, 2, W) by sensor: the former in wider
+    and narrower bands."""
 
     times: dict[str, Array]
     other_bands: dict[str, Array]
@@ -64,7 +66,7 @@ def longest_period(model: FloatingModel) -> float:
     """Of the natural vibrations of the study's own scene as it stands at time 0, s; where these are not known, of
     bodies."""
     omega = natural_omega(model)
-    swings = [] if omega is None else omega[omega > STILL * omega.max(initial=0.0)]
+    swings = [] if omega is None else omega[omega > RIGID * omega.max(initial=0.0)]
     return 2.0 * np.pi / float(min(swings, default=model.first_omega))
 
 

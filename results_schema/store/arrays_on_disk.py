@@ -4,6 +4,7 @@ xarray carries them as it carries those of files that it opens itself: to select
 """
 
 import math
+import threading
 from collections import OrderedDict
 from collections.abc import Callable
 from typing import Any
@@ -34,8 +35,9 @@ class OnDisk(BackendArray):
         rows = key[0] if isinstance(key[0], slice) else slice(key[0], key[0] + 1)
         first, end, step = rows.indices(self.shape[0])
         column = self._column(key)
-        if _RECENT.has(self, column) or ((first, end) == (0, self.shape[0]) and _RECENT.holds(self, column)):
-            return np.asarray(_RECENT.read(self, column)[key if column is None else key[:-1]])
+        known = _RECENT.numbers(self, column, (first, end) == (0, self.shape[0]))
+        if known is not None:
+            return np.asarray(known[key if column is None else key[:-1]])
         found = self.read(slice(first, max(first, end)), key[1:])
         return np.asarray(found[::step] if isinstance(key[0], slice) else found[0])
 
@@ -50,25 +52,24 @@ class _Recent:
 
     def __init__(self) -> None:
         self._numbers: OrderedDict[tuple[OnDisk, int | None], np.ndarray] = OrderedDict()
+        self._lock = threading.RLock()  # dask reads on several threads
 
-    def has(self, array: OnDisk, column: int | None) -> bool:
-        """Whether it is in memory."""
-        return (array, column) in self._numbers
-
-    def holds(self, array: OnDisk, column: int | None) -> bool:
-        """Whether there would be room for it."""
-        return _bytes(array, column) <= RECENT_BYTES
-
-    def read(self, array: OnDisk, column: int | None) -> np.ndarray:
-        """An array, not to be changed, from memory where it is there."""
-        if not self.has(array, column):
-            self._make_room(_bytes(array, column))
-            rest: tuple[int | slice, ...] = () if column is None else (*[slice(None)] * (len(array.shape) - 2), column)
-            numbers = array.read(slice(0, array.shape[0]), rest)
-            numbers.flags.writeable = False
-            self._numbers[array, column] = numbers
-        self._numbers.move_to_end((array, column))
-        return self._numbers[array, column]
+    def numbers(self, array: OnDisk, column: int | None, is_asked_for: bool) -> np.ndarray | None:
+        """An array or column, not to be changed, from memory; read where all of it is asked for and there would be
+        room, else None."""
+        key = array, column
+        with self._lock:
+            if key not in self._numbers:
+                if not is_asked_for or _bytes(array, column) > RECENT_BYTES:
+                    return None
+                self._make_room(_bytes(array, column))
+                rest: tuple[int | slice, ...] = (
+                    () if column is None else (*[slice(None)] * (len(array.shape) - 2), column)
+                )
+                self._numbers[key] = numbers = array.read(slice(0, array.shape[0]), rest)
+                numbers.flags.writeable = False
+            self._numbers.move_to_end(key)
+            return self._numbers[key]
 
     def _make_room(self, size: int) -> None:
         """Forget what was asked for longest ago, before more is read."""

@@ -177,7 +177,7 @@ def _residual(results: Results, sensor: str, asked: AskedOfRest) -> str:
     )
     axis = next(iter(by_effect(results, values)), None)
     limit = asked.residual.of(results.study.sensor[sensor])
-    settled = settling_in_words(results, sensor, asked.settling_time, axis)
+    settled = "".join(f"; {one}" for one in told_settling(results, sensor, asked.settling_time, axis))
     between = told_both_ways(results, values, "that swing", units, doubt) + _told_between(results, values, place)
     if limit is None:
         return f"{said}{settled}.{between}"
@@ -207,12 +207,12 @@ def _up_and_down(axis: Axis) -> str:
     )
 
 
-def settling_in_words(results: Results, sensor: str, limit: float | None, axis: Axis | None) -> str:
+def told_settling(results: Results, sensor: str, limit: float | None, axis: Axis | None) -> list[str]:
     """How long a sensor takes to settle at most, where along a swept number that is longer than a limit (s), and how
-    many variants have not by the end of their runs, behind another sentence; "" where it has no band."""
+    many variants have not by the end of their runs, as parts of a sentence; none where it has no band."""
     band = results.study.sensor[sensor].settling_band
     if band is None:
-        return ""
+        return []
     values = settling_of(results, names_of_times(sensor)[0])
     left = int(np.count_nonzero(results.with_values & np.isnan(values)))
     place, units, said = extreme(values), results.sensors[sensor], list[str]()
@@ -230,7 +230,7 @@ def settling_in_words(results: Results, sensor: str, limit: float | None, axis: 
         said.append(f"it takes longer than {quantity(limit, 's')} {longer}")
     if left:
         said.append(_not_settled(results, results.with_values & np.isnan(values), axis))
-    return "".join(f"; {one}" for one in said)
+    return said
 
 
 def _not_settled(results: Results, left: Mask, axis: Axis | None) -> str:

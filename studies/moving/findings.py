@@ -10,7 +10,7 @@ from studies.findings.absolute_errors import errors_of_size
 from studies.findings.amplification import sizes
 from studies.findings.beyond import limits_of, ranked, told_limit
 from studies.findings.effects import by_effect, told_effects
-from studies.findings.residual import settling_in_words, settling_of, until_settled
+from studies.findings.residual import settling_of, told_settling, until_settled
 from studies.moving.question import Question
 from studies.protocol.study import question_of
 from studies.results.findings_common import in_words, over_all, told_statuses, uncertainty, while_held
@@ -127,8 +127,8 @@ def _settles(results: Results, sensor: str) -> str:
         return ""
     times = settling_of(results, names_of_times(sensor)[0])
     axis = next(iter(by_effect(results, times)), None) if np.isfinite(times).any() else None
-    said = settling_in_words(results, sensor, question_of(results.study, Question).settling_time, axis)
-    return f" {sensor}: {said.removeprefix('; ')}."
+    said = told_settling(results, sensor, question_of(results.study, Question).settling_time, axis)
+    return f" {sensor}: {'; '.join(said)}."
 
 
 def _beyond_after(results: Results, sensor: str) -> str:

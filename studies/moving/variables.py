@@ -104,7 +104,7 @@ RESULTS = (
         units="s",
         long_name="settling time of {sensor}",
         meaning="after the stop, until it stays within its settling_band of where it comes to rest; NaN where that is "
-        "less than two longest periods before the end",
+        "less than two longest periods before the end, or no equilibrium is found",
         required=False,
         nan_allowed=True,
     ),

@@ -1,7 +1,8 @@
 """What variants are computed with, by the measured errors of pilots near them."""
 
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -12,12 +13,13 @@ from engine.accuracy.choice import (
     MOST_SCENES,
     NEIGHBOURS,
     PILOTS,
+    Cheapest,
     coordinates,
     pilots_of,
     scenes_of_pilots,
 )
 from engine.accuracy.reference import Marches, converge, in_full
-from engine.accuracy.results import results_of
+from engine.accuracy.results import Result, deciding, results_of
 from engine.batch.plan import make_plan
 from engine.kernels.nearest_pilots import ALIKE, cheapest, nearest
 from results_schema.arrays import Array
@@ -225,3 +227,22 @@ def test_statics_are_chosen_where_they_are_enough() -> None:
     }
     run = executed(passages(sweep=slow))
     assert np.all(run.arrays["work"] == 0.0) and np.all(run.arrays["status"] == Status.OK)
+
+
+@pytest.mark.parametrize(("known", "ranked"), [([1, 2], [2, 1]), ([], [3, 2, 1, 0])])
+def test_rungs_on_which_no_pilot_was_are_left_out_unless_none_has_values(known: list[int], ranked: list[int]) -> None:
+    """Ascending by their work: a sweep in which every pilot diverges is marched all the same."""
+    held = np.full((4, 3), np.inf)
+    held[known, 0] = 0.5
+    errors = cast(Any, SimpleNamespace(wanted=np.zeros((3, 4)), held_slopes=np.zeros((3, 2, 4))))
+    found = Cheapest.by(errors, np.array([8.0, 4.0, 2.0, 1.0]), held)
+    assert found.ranked.tolist() == ranked and found.wanted.shape[-1] == found.slopes.shape[-1] == len(ranked)
+
+
+def test_what_jumps_does_not_decide_where_nothing_is_held() -> None:
+    names = ("tip_max", "tip_max_position", "tip_settling_time", "tip_move_and_settle_time", "car_contact_force_max")
+    told = tuple(Result(name, name.partition("_")[0]) for name in names)
+    assert [one.name for one in deciding(told, 1e-3) if one.tolerance == 1e-3] == ["tip_max"]
+    assert [one.name for one in deciding(told[1:], 1e-3) if one.tolerance == 1e-3] == ["car_contact_force_max"]
+    held = (told[0]._replace(tolerance=1e-2), *told[1:])
+    assert deciding(held, 1e-3) == held

@@ -3,7 +3,8 @@
 import math
 import re
 import time
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -212,3 +213,14 @@ def test_a_mass_on_its_damper_over_a_stiff_beam_is_damped_as_by_itself() -> None
     alone, standing = tables["Sprung masses by themselves"], tables["Where the first carriage stands"]
     assert alone.rows[0][2] == "0.25"
     assert standing.rows[0][standing.headings.index("its damping ratio")] == "0.25"
+
+
+def test_the_shortest_march_is_not_taken_for_a_slow_processor() -> None:
+    """Of 0.02 s for a march that should take a microsecond nearly all is what any march takes."""
+    told = iter([0.0, 0.05, 0.05, 0.07])
+    group = SimpleNamespace(variants=np.arange(1), seconds_per_variant=1e-6, found=lambda *_: None)
+    pace, least = forecasting._pace(
+        cast(Any, SimpleNamespace(values=lambda *_: None, choice=None)), cast(Any, group), lambda: next(told)
+    )
+    assert pace == forecasting.SLOWEST
+    assert least == pytest.approx(0.03 + 0.02 - pace * 1e-6)

@@ -30,6 +30,7 @@ from tests.bodies.frames import straight
 from tests.engine import gantries
 from tests.engine.build import Table, beam, cruise, force, mass, shuttle, study, under
 from tests.floating.scenes import ARM, history, steps
+from tests.floating.studies.scenes import driven
 from tests.pictures.test_report import HOSTILE, MINUS, check_standing_alone
 from tests.robots.scenes import marched, scene
 from tests.studies import scenes
@@ -200,6 +201,19 @@ def test_a_deflection_is_said_to_be_of_one_point_where_the_weight_has_several() 
     (table,) = (table for table in page.tables if table.title == "Carriages")
     sags = [row[table.headings.index("largest static deflection under it")] for row in table.rows]
     assert [sag.endswith(" of its weight at one point") for sag in sags] == [True, False] and all(sags)
+
+
+def test_a_mast_is_as_high_as_it_is_long_and_sags_under_nothing() -> None:
+    """A track that leans sags by the part of the weight across it."""
+    found = {}
+    for turned in (0.0, 60.0, 90.0):
+        frame = {"arm": {"turned": [0, f"{turned} deg", 0]}}
+        page = page_of(driven(joints=(), frame=frame, gravity=9.81), ())
+        rows = {table.title: dict(zip(table.headings, table.rows[0], strict=True)) for table in page.tables}
+        found[turned] = rows["Bodies"]["extent x, y, z"], rows["Carriages"].get("largest static deflection under it")
+    assert found[0.0][0] == "10 x 0 x 0 m" and found[90.0] == ("0 x 0 x 10 m", None)
+    level, leaning = (float(str(found[turned][1]).split(" ")[0]) for turned in (0.0, 60.0))
+    assert leaning == pytest.approx(0.5 * level, rel=2e-2)
 
 
 def test_what_follows_stands_behind() -> None:

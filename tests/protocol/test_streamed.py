@@ -3,6 +3,7 @@
 import tracemalloc
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -191,6 +192,30 @@ def test_slices_of_what_is_on_the_disk(monkeypatch: pytest.MonkeyPatch) -> None:
     assert asked[:2] == [(slice(2, 5), (slice(None), slice(None))), (slice(7, 8), (1, 2))]
     # transposed, once as it is and once from what was read as a whole
     assert [at for rows, at in asked if rows == slice(0, 10)] == [(slice(0, 4), slice(0, 3)), ()]
+
+
+def test_what_was_asked_for_longest_ago_is_forgotten_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Arrays, and columns of few numbers, of which two of 80 bytes have room."""
+    asked = list[str]()
+
+    def on_disk(name: str, numbers: np.ndarray) -> Any:
+        def read(rows: slice, at: tuple[int | slice, ...]) -> np.ndarray:
+            asked.append(name)
+            return numbers[(rows, *at)].copy()
+
+        array = arrays_on_disk.OnDisk(numbers.shape, numbers.dtype, read)
+        return tables.xr.Variable(("x", "y")[: numbers.ndim], arrays_on_disk.indexing.LazilyIndexedArray(array))
+
+    monkeypatch.setattr(arrays_on_disk, "RECENT_BYTES", 160)
+    numbers = np.arange(30.0).reshape(10, 3)
+    a, b, columns = on_disk("a", numbers[:, 0]), on_disk("b", numbers[:, 1]), on_disk("columns", numbers)
+    for variable, wanted in ((a, numbers[:, 0]), (b, numbers[:, 1]), (a[2:4], numbers[2:4, 0])):
+        assert np.array_equal(variable.values, wanted)
+    assert asked == ["a", "b"]
+    assert np.array_equal(columns[:, 2].values, numbers[:, 2]) and np.array_equal(columns[4:, 2].values, numbers[4:, 2])
+    assert np.array_equal(a.values, numbers[:, 0]) and asked == ["a", "b", "columns"]
+    assert np.array_equal(b.values, numbers[:, 1]) and asked[3:] == ["b"]
+    assert np.array_equal(columns.values, numbers) and asked[4:] == ["columns"]  # more than there is room for
 
 
 def test_an_archive_that_is_replaced_while_it_is_read_is_no_mixture(

@@ -332,6 +332,17 @@ def test_check_tells_speeds_at_which_axles_push_in_step() -> None:
     ]
 
 
+def test_check_tells_a_resonance_just_beyond_the_sweep() -> None:
+    """Which is not the strongest within it."""
+    first = np.pi / 2.0 * np.sqrt(210e9 * 8.33e-6 / (7850.0 * 0.01)) / 15.0**2
+    whole = load(TEXT.replace("[5, 10]", f"[3, {0.95 * 4.0 * first}]").replace("spacing = 2.0", "spacing = 4.0"))
+    (table,) = [table for table in preview(kind_of(whole).parts(whole), 1).tables if "in step" in table.title]
+    beyond, *within = table.rows
+    assert ", beyond" in beyond[0] and "strongest" not in beyond[4]
+    assert within and not any("beyond" in row[0] for row in within)
+    assert sum("the strongest" in row[4] for row in within) == 1
+
+
 def test_equal_trains_push_in_step_at_equal_speeds() -> None:
     """The second one sets off further back, so that its way is longer."""
     second = TEXT.replace("train.tram", "train.other").split("[train.other]")[1].split("[sensor")[0]

@@ -132,8 +132,7 @@ class TimedMove(TimeMotion):
     time: Time = Field(gt=0)
 
     def pieces(self, number: Number) -> Array:
-        start, end = number("start"), number("end")
-        return move_pieces(start, end, reached_in(np.abs(end - start), number("time")).__getitem__)
+        return timed_pieces(number("start"), number("end"), number("time"))
 
 
 class Points(TimeMotion):
@@ -218,6 +217,11 @@ def move_pieces(start: Array, end: Array, number: Number) -> Array:
     found[:, :, CONSTANT : CONSTANT + DEGREE] *= (end - start)[:, None, None]
     found[:, :, CONSTANT] += start[:, None]
     return found
+
+
+def timed_pieces(start: Array, end: Array, time: Array) -> Array:
+    """(V, pieces, 10) of moves between places (V,) in times (V,) s."""
+    return move_pieces(start, end, reached_in(np.abs(end - start), time).__getitem__)
 
 
 def spline_pieces(number: Number, count: int, key: str) -> Array:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from pydantic import Field
 
 from engine.scene.motions.base import Array, BetweenPlaces, Path, Side, both_places, two_places
-from engine.scene.motions.of_joints import Number, move_pieces, reached_in
+from engine.scene.motions.of_joints import Number, move_pieces, reached_in, timed_pieces
 from engine.scene.motions.profile import PHASES, Profile, profile
 from engine.study_file.checks import Check, on_body
 from engine.study_file.units import Acceleration, Jerk, Speed, Time
@@ -147,8 +147,7 @@ class TimedMove(FromRestToRest):
     time: Time = Field(gt=0)
 
     def pieces(self, number: Number) -> Array:
-        start, end = both_places(number)
-        return move_pieces(start, end, reached_in(np.abs(end - start), number("time")).__getitem__)
+        return timed_pieces(*both_places(number), number("time"))
 
     @cached_property
     def _move(self) -> Profile:

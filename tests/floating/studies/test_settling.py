@@ -102,6 +102,19 @@ def test_what_still_swings_near_the_end_has_not_settled() -> None:
     assert np.isnan(never["tip_settling_time"])
 
 
+@pytest.mark.parametrize(("gravity", "rests"), [(GRAVITY, True), (0.0, False)])
+def test_what_turns_freely_beside_an_arm_needs_a_rest(gravity: float, rests: bool) -> None:
+    """A pendulum, whose hinge has no frequency without weight, leaves the arm's times alone where it hangs."""
+    bob = {"kind": "rigid", "length": 0.5, "mass": 1.0, "inertia": 0.1}
+    hangs = {"turned": [0, "-90 deg", 0], "joints": [{"kind": "revolute", "axis": [0, 1, 0]}]}
+    alone = turned(sweep={}, gravity=gravity)
+    frame = {"arm": alone.frame["arm"].model_dump(exclude_unset=True), "bob": hangs}
+    found = studies.run(turned(sweep={}, gravity=gravity, body={"arm": ARM, "bob": bob}, frame=frame))
+    wanted = float(studies.run(alone)["tip_settling_time"])
+    assert wanted > 0.0
+    assert float(found["tip_settling_time"]) == pytest.approx(wanted if rests else np.nan, abs=0.01, nan_ok=True)
+
+
 def test_the_longest_period_is_that_of_the_loaded_arm() -> None:
     """Of a mass at the end of an arm that is light beside it: sqrt(3 EI / m L^3)."""
     tool = {"kind": "rigid", "length": 0.1, "mass": 50.0, "inertia": 0.0}
