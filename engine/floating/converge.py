@@ -14,9 +14,8 @@ from engine.accuracy.reference import left_over
 from engine.floating.march import march
 from engine.floating.model import build
 from engine.floating.results import Outcome, Result, differences, outcome, results_of
+from engine.floating.schemes import USUAL, scheme_of, weights_of
 from engine.floating.settling import tell_times
-from engine.kernels.floating.layout import Weights
-from engine.kernels.schemes import SCHEMES, AlphaScheme, NewmarkScheme
 from engine.march.stepper import Halted
 from results_schema.arrays import Array, Counts
 from results_schema.gravest_status import gravest, lost
@@ -25,6 +24,7 @@ from results_schema.status import Fidelity, Status
 if TYPE_CHECKING:
     from engine.floating.model import FloatingModel
     from engine.floating.model_choice import Rung
+    from engine.kernels.schemes import AlphaScheme, NewmarkScheme
     from engine.scene.study import Study
     from engine.scene.variants import VariantValues
 
@@ -52,6 +52,16 @@ class Level:
     every: int
     scheme: NewmarkScheme | AlphaScheme
 
+    @property
+    def stations(self) -> Counts:
+        """(S,) stations at the same times on every level."""
+        return np.arange(0, self.steps + 1, self.every, dtype=np.int64)
+
+    def march(self, values: VariantValues, duration: Array, fidelity: Fidelity = Fidelity.FRAME) -> Outcome:
+        """What variants report that take a duration (V,) s."""
+        how = self.steps, self.stations, weights_of(self.scheme), fidelity
+        return outcome(self.model, march(self.model, values, duration, *how))
+
 
 @dataclass(frozen=True, eq=False)
 class Converged:
@@ -73,9 +83,9 @@ def levels(study: Study, duration: float, modes: int) -> Iterator[Level]:
     open."""
     fixed, model = study.solver.steps, build(study, modes)
     coarsest, factor = int(fixed) if fixed != "auto" else usual_steps(model, duration), 1
-    scheme = scheme_of(study, duration / usual_steps(model, duration) * model.highest_omega)
+    scheme = scheme_of(study)
     every = int(np.ceil(coarsest / STATIONS))
-    if fixed == "auto":
+    if fixed == "auto" and scheme is not USUAL:
         while coarsest * factor * FAR_WITHIN * scheme.stability_limit < duration * model.highest_omega:
             factor *= 2
     for _ in range(LEVELS):
@@ -89,30 +99,6 @@ def usual_steps(model: FloatingModel, duration: float) -> int:
     """Of the coarsest level, a multiple of the stations."""
     least = duration * model.first_omega / (2.0 * np.pi) * FIRST_STEPS
     return STATIONS * max(1, int(np.ceil(least / STATIONS)))
-
-
-def scheme_of(study: Study, coarsest: float) -> NewmarkScheme | AlphaScheme:
-    """The scheme that a study asks for; else Fox-Goodwin, whose phase is of fourth order, unless its limit would ask
-    for more steps than the coarsest march has, of which omega h is given. Raises BadInput for one that does not march
-    frames."""
-    if study.solver.scheme == "auto":
-        name = "fox-goodwin" if coarsest < FAR_WITHIN * SCHEMES["fox-goodwin"]({}).stability_limit else ""
-        found = SCHEMES[name or "average-acceleration"]({})
-        assert isinstance(found, NewmarkScheme)
-        return found
-    scheme = study.solver.integration
-    if isinstance(scheme, NewmarkScheme | AlphaScheme) and scheme.stride == 1:
-        return scheme
-    what = "this scheme does not march frames that move"
-    expected = "auto, average-acceleration, fox-goodwin, newmark, hht-alpha or generalized-alpha"
-    raise study.source.fault("solver.scheme", what, expected=expected, received=study.solver.scheme)
-
-
-def weights(scheme: NewmarkScheme | AlphaScheme) -> Weights:
-    """A scheme as kernels take it."""
-    if isinstance(scheme, AlphaScheme):
-        return Weights(scheme.beta, scheme.gamma, scheme.m, scheme.f)
-    return Weights(scheme.beta, scheme.gamma, 0.0, 0.0)
 
 
 def converge(
@@ -132,8 +118,7 @@ def converge(
         if halted():
             raise Halted
         model, own = level.model, values.part(active)
-        how = level.steps, stations(level), weights(level.scheme), rung.fidelity
-        now = outcome(model, march(model, own, duration[active], *how))
+        now = level.march(own, duration[active], rung.fidelity)
         if found is None:
             found, results, scheme = now, results_of(model), level.scheme
             error = np.full((len(results), V), np.nan)
@@ -186,19 +171,12 @@ def observed(
         if halted():
             raise Halted
         if lanes.size:
-            beyond = march(
-                level.model, values.part(lanes), duration[lanes], level.steps, stations(level), weights(level.scheme)
-            )
-            apart[:, lanes] = differences(level.model, found.outcome.of(lanes), outcome(level.model, beyond))
+            beyond = level.march(values.part(lanes), duration[lanes])
+            apart[:, lanes] = differences(level.model, found.outcome.of(lanes), beyond)
             left[lanes] = False
         if not left.any():
             break
     return np.where(np.isfinite(apart), apart, np.nan), found.error
-
-
-def stations(level: Level) -> Counts:
-    """(S,) stations at the same times on every level."""
-    return np.arange(0, level.steps + 1, level.every, dtype=np.int64)
 
 
 def worst(error: Array, results: tuple[Result, ...], values: VariantValues) -> Array:

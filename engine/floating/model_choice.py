@@ -13,11 +13,10 @@ import numpy as np
 from engine.accuracy.few_pilots import FewPilots
 from engine.accuracy.reference import LEFT_BY_ELEMENTS, left_over
 from engine.bodies.modal.description import MAX_MODES
-from engine.floating.converge import MORE_MODES, STATIONS, Level, levels, stations, usual_steps, weights, worst
-from engine.floating.march import march
+from engine.floating.converge import MORE_MODES, STATIONS, Level, levels, usual_steps, worst
 from engine.floating.model import build
-from engine.floating.results import Outcome, differences, outcome, results_of
-from engine.kernels.schemes import NewmarkScheme
+from engine.floating.results import Outcome, differences, results_of
+from engine.floating.schemes import USUAL
 from engine.scene.frames import GROUND
 from results_schema.arrays import Array
 from results_schema.status import Fidelity
@@ -29,7 +28,6 @@ if TYPE_CHECKING:
 
 PILOTS = 16  # of a scene: by so many the errors that are told were measured (`tests.calibration.frames`)
 PART = 0.1  # of a tolerance that the cheaper model may take; the rest is for modes and steps
-UNLIMITED = NewmarkScheme("average-acceleration", 0.25, 0.5)  # in its steps, however fast the highest mode is
 FINER = (1, 4, 16)  # times the coarsest steps, where pilots fail with these
 FIRST_MODES, MOST_MODES = 2, 32  # of bending, of a beam
 
@@ -63,10 +61,9 @@ class Pilots(NamedTuple):
         """The same with some bodies stiffened."""
         return self._replace(study=_stiffened(self.study, names))
 
-    def march(self, level: Level, fidelity: Fidelity = Fidelity.FRAME) -> Outcome:
-        """What they report by a level."""
-        how = level.steps, stations(level), weights(level.scheme), fidelity
-        return outcome(level.model, march(level.model, self.values, self.duration, *how))
+    def march(self, model: FloatingModel, steps: int) -> Outcome:
+        """What they report by so many steps."""
+        return Level(model, steps, steps // STATIONS, USUAL).march(self.values, self.duration)
 
 
 def choose(study: Study, pilots: VariantValues, duration: Array, longest: float) -> Rung:
@@ -84,7 +81,7 @@ def choose(study: Study, pilots: VariantValues, duration: Array, longest: float)
     full = Rung(Fidelity.FRAME, modes, left_out, by_fixed, stiffened)
     if study.solver.fidelity == "full" or not is_given(model, pilots):
         return full
-    cheap, dear = (own.march(level, fidelity) for fidelity in (Fidelity.GIVEN_FRAME, Fidelity.FRAME))
+    cheap, dear = (level.march(pilots, duration, fidelity) for fidelity in (Fidelity.GIVEN_FRAME, Fidelity.FRAME))
     apart = differences(model, cheap, dear)
     known = ~np.isnan(apart).any(axis=0)  # what the floating frame itself has no values of tells nothing
     if not known.any() or (worst(apart, results, pilots)[known] > PART).any():
@@ -128,9 +125,7 @@ def _by_lack_of_stiffening(pilots: Pilots, modes: int, names: tuple[str, ...]) -
     stiff = pilots.stiffened(names)
     for factor in FINER:
         steps = usual_steps(model, pilots.longest) * factor
-        plain, other = (
-            one.march(Level(build(one.study, modes), steps, steps // STATIONS, UNLIMITED)) for one in (pilots, stiff)
-        )
+        plain, other = (one.march(build(one.study, modes), steps) for one in (pilots, stiff))
         found = differences(model, plain, other)
         if not np.isnan(found).all(axis=1).any():
             break
@@ -152,15 +147,15 @@ def _enough_by(pilots: Pilots, steps: int) -> tuple[int, Array] | None:
     """The same by marches of so many steps, whose own error is in all of them; None where no pilot gets through."""
     modes, coarse, change = FIRST_MODES, None, np.array(np.nan)
     while True:
-        level = Level(build(pilots.study, modes), steps, steps // STATIONS, UNLIMITED)
-        fine = pilots.march(level)
+        model = build(pilots.study, modes)
+        fine = pilots.march(model, steps)
         if coarse is not None:
-            apart = differences(level.model, coarse, fine)
+            apart = differences(model, coarse, fine)
             left = left_over(apart, change)
             known = ~np.isnan(left).any(axis=0)
             if not known.any():
                 return None
-            before = worst(apart + left, results_of(level.model), pilots.values)
+            before = worst(apart + left, results_of(model), pilots.values)
             if (before[known] <= PART).all():
                 return modes // MORE_MODES, (apart + left)[:, known].max(axis=1)
             if modes >= MOST_MODES:
@@ -196,7 +191,7 @@ def _by_elements(pilots: Pilots, modes: int) -> Array:
     finer = build(pilots.study.model_copy(update={"body": bodies}), modes)
     for factor in FINER:
         steps = usual_steps(model, pilots.longest) * factor
-        own, other = (pilots.march(Level(one, steps, steps // STATIONS, UNLIMITED)) for one in (model, finer))
+        own, other = (pilots.march(one, steps) for one in (model, finer))
         found = LEFT_BY_ELEMENTS * differences(model, own, other)
         if not np.isnan(found).all(axis=1).any():
             break
@@ -209,7 +204,7 @@ def with_more_modes(pilots: Pilots, modes: int, factor: int) -> Iterator[Outcome
     steps = usual_steps(build(pilots.study, modes), pilots.longest) * factor
     for times in (1, 2, 4):
         study = _with_more_modes(pilots.study, times) if times > 1 else pilots.study
-        yield pilots.march(Level(build(study, modes), steps, steps // STATIONS, UNLIMITED))
+        yield pilots.march(build(study, modes), steps)
 
 
 def _with_more_modes(study: Study, times: int) -> Study:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -78,14 +79,13 @@ def _audits_are_too_dear(everything: Sequence[Piece], found: Mapping[int, xr.Dat
 
 def _compile(scene: Scene) -> None:
     """A march of two steps, stored as a piece is, so that what is measured begins with kernels and libraries."""
-    from engine.floating.converge import levels, weights
-    from engine.floating.march import march
+    from engine.floating.converge import levels
     from engine.floating.model_choice import FIRST_MODES
     from engine.scene.variants import VariantValues
 
     level = next(iter(levels(scene.study, 1.0, FIRST_MODES)))
     values = VariantValues(scene.study, {}, 1)
-    found = march(level.model, values, np.full(1, 2.0 / level.steps), 2, np.array([0, 2]), weights(level.scheme))
+    found = replace(level, steps=2, every=1).march(values, np.full(1, 2.0 / level.steps))
     unlabelled({"history": found.history})
 
 

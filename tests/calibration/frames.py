@@ -10,17 +10,17 @@ the truth, and by how much they differ is its doubt.
 import argparse
 import time
 from collections import Counter
+from dataclasses import replace
 from functools import partial
 from multiprocessing import get_context
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from engine.floating.converge import converge, levels, weights
-from engine.floating.march import march
+from engine.floating.converge import converge, levels
 from engine.floating.model import FloatingModel, build
 from engine.floating.model_choice import choose
-from engine.floating.results import Outcome, differences, outcome, results_of
+from engine.floating.results import Outcome, differences, results_of
 from engine.linear_algebra import one_thread
 from engine.scene.study import Study, load
 from engine.scene.sweep import expand
@@ -216,14 +216,11 @@ def _truth(study: Study, values: VariantValues, steps: int, longest: float, mode
     found = []
     for finer, wider in FINER:
         model = build(study, int(modes * wider)) if level.model.is_open else level.model
-        while steps * finer * level.scheme.stability_limit < longest * model.highest_omega:
-            finer *= 2
         count = steps * finer
         if count * model.size > MOST_WORK:
             return None
-        kept = np.arange(0, count + 1, level.every * finer, dtype=np.int64)
-        marched = march(model, values, np.full(values.size, longest), count, kept, weights(level.scheme))
-        found.append(outcome(model, marched))
+        fine = replace(level, model=model, steps=count, every=level.every * finer)
+        found.append(fine.march(values, np.full(values.size, longest)))
     return Truth(level.model, *found)
 
 

@@ -35,7 +35,7 @@ TERMS = {
     "base acceleration": ("dot(shared_vector(system.modes, row, TRANSLATION), base) + ", ""),
     "undeformed places": ("left = left + by * lanes_at(work.turning, (b, VALUES + 3 * a + e))", "pass"),
     "damping": ("damping * lanes_at(state.tried.u, (k,))", "0.0"),
-    "damping in the step": ("add_to_matrix(solver.fresh, k, k, ways[1] * damping)", "pass"),
+    "damping in the step": ("add_to_matrix(solver.fresh, k, k, ways.of_u * damping)", "pass"),
     "stiffness": ("all_lanes(system.pairs[row, STIFFNESS])", "all_lanes(0.0)"),
     "gyroscopic terms": (
         "keep_matrix(work.turning, b, RATES, by_rate)",
@@ -43,22 +43,28 @@ TERMS = {
     ),
     "Euler terms": ("vector(work.frames, b, ANGULAR)", "(all_lanes(0.0),) * 3"),
     "centrifugal terms": ("turned_by(w, al)", "turned_by(times(0.0, w), al)"),
-    "rates in the step": ("part = of_u * lanes_at(work.turning, (b, RATES + e)) + ", "part = "),
-    "values in the step": (" + of_y * lanes_at(work.turning, (b, VALUES + e))", ""),
+    "rates in the step": ("mass + ways.of_u * by_rate", "mass"),
+    "values in the step": (" + of_coordinate(ways, m) * by_value", ""),
+    "values of each coordinate": ("of_coordinate(ways, m) * by_value", "of_coordinate(ways, k) * by_value"),
+    "mass in the step": ("mass + ways.of_u", "ways.of_u"),
     "what modes do by rates": ("by_rate = by_rate + both * lanes_at(work.turning, (b, RATES + 3 * a + e))", "pass"),
     "what modes do by values": ("by_value = by_value + both * lanes_at(work.turning, (b, VALUES + 3 * a + e))", "pass"),
-    "Coriolis' along the track": ("part + 2.0 * of_u * ds + of_y * dds", "part + of_y * dds"),
-    "change of speed": ("part + 2.0 * of_u * ds + of_y * dds", "part + 2.0 * of_u * ds"),
-    "slope of a frame that turns": ("part = of_y * ds * lanes_at", "part = 0.0 * ds * lanes_at"),
-    "curvature": ("times(ways[0] * along[1] * along[1], vector(work.modes, j, CURVE))", "times(0.0, along)"),
+    "Coriolis' along the track": ("by_rate = times(2.0 * ds, slope)", "by_rate = times(0.0, slope)"),
+    "change of speed": ("times(dds, slope)", "times(0.0, slope)"),
+    "slope of a frame that turns": ("times(ds * slope[e], column", "times(0.0 * slope[e], column"),
+    "curvature": ("times(ds * ds, vector(work.modes, j, CURVE))", "times(0.0, slope)"),
+    "rates under a carriage": ("times(shape[e], column(work.turning, b, RATES + e))", "times(0.0, shape)"),
+    "values under a carriage": ("times(shape[e], column(work.turning, b, VALUES + e))", "times(0.0, shape)"),
     "mass of what is sprung": ("mass = mass + carried(lane, c, SPRUNG_MASS)", "pass"),
     "force of what is sprung": ("f = add(f, sprung(", "add(f, sprung("),
     "rate of what is sprung": ("times(u, by_rate)", "times(0.0, by_rate)"),
     "place of what is sprung": ("times(y, by_value)", "times(0.0, by_value)"),
     "spring": ("spring * y", "0.0"),
-    "spring in the step": ("ways[0] * spring", "0.0"),
+    "spring in the step": ("of_y * spring", "0.0"),
+    "what is sprung by its rate": ("add(up, add(times(ways.of_u, by_rate), ", "add(up, add(times(0.0, by_rate), "),
+    "what is sprung by its value": ("by_rate), times(of_y, by_value)))\n", "by_rate), times(0.0, by_value)))\n"),
     "damper": ("damper * u", "0.0"),
-    "damper in the step": ("ways[1] * damper", "0.0"),
+    "damper in the step": ("ways.of_u * damper", "0.0"),
     "modes by what is sprung": ("add_to_matrix(solver.fresh, k, z, own", "add_to_matrix(solver.fresh, k, z, 0.0 * own"),
     "what is sprung by modes": ("add_to_matrix(solver.fresh, z, k, own", "add_to_matrix(solver.fresh, z, k, 0.0 * own"),
     "forces of loads": ("dot(shared_vector(system.grip_modes, row, PUSHED), f)", "0.0"),
@@ -72,12 +78,12 @@ LINEARISED = {
     "stiffening by accelerations": (" - pulled(system, b, row, base)", ""),
     "stiffening by carriages": ("add_to(state.residual, i, by * lanes_at(state.tried.y, (j,)))", "pass"),
     "stiffening by carriages, twice": ("add_to(state.residual, j, by * lanes_at(state.tried.y, (i,)))", "pass"),
-    "stiffening by carriages in the step": ("add_to_matrix(solver.fresh, i, j, ways[0] * by)", "pass"),
-    "stiffening by carriages in the step, twice": ("add_to_matrix(solver.fresh, j, i, ways[0] * by)", "pass"),
+    "stiffening by carriages in the step": ("of_coordinate(ways, j) * by", "0.0 * by"),
+    "stiffening by carriages in the step, twice": ("of_coordinate(ways, i) * by", "0.0 * by"),
     "stiffening by loads": ("by = by + weighed(system.grip_shorter, p, system.tree[b, SHORTENED], (i, j), f)", "pass"),
     "torques of loads": ("weight * dot(turned, about)", "0.0"),
     "turned torques": ("(-0.5 * weight) * dot(cross(other, turned), about)", "0.0 * about[0]"),
-    "loads in the step": ("add_to_matrix(solver.fresh, first + i, first + j, ways[0] * by)\n        add_to", "add_to"),
+    "loads in the step": ("of_coordinate(ways, first + j) * by", "0.0 * by"),
 }  # fmt: skip
 
 
@@ -91,6 +97,7 @@ def left(module: ModuleType, model: FloatingModel, scheme: Weights, small: float
     motions_at(lane.motions, np.full(LANES, AT), np.full(LANES, AT), work.piece, work.motions)
     for k, part in enumerate((state.now.y, state.now.u, state.now.a, state.inner)):
         part[:] = small * 10.0 ** min(k, 2) * rng.normal(size=(model.size, 1))
+    state.beta[:] = np.linspace(0.2, 0.4, model.size)[:, None]
     for b in range(len(model.bodies)):  # those that rest are followed once
         follow_frame(model.system, lane, b, state.now, work)
     for _ in range(REPEATED if scheme is NEWMARK else 1):  # which does not ask for accelerations before

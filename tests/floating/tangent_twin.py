@@ -13,20 +13,21 @@ from engine.floating.lanes import in_blocks, lanes
 from engine.floating.model import FloatingModel, build
 from engine.kernels.floating import march, newton
 from engine.kernels.floating.equations import residual
-from engine.kernels.floating.layout import STATISTICS, Coordinates, Lane, Record
+from engine.kernels.floating.layout import STATISTICS, Coordinates, Lane, Record, Weights
 from engine.kernels.floating.motions import motions_at
+from engine.kernels.floating.state import ways_of
 from engine.kernels.layout import LANES
 from engine.scene.variants import VariantValues
 from tests.floating import loads_twin, residual_twin
 from tests.floating.scenes import mutated
 
-STEP, BETA, GAMMA = 0.02, 0.25, 0.5
+STEP, GAMMA = 0.02, 0.5
 AGREE, DIFFER = 1e-4, 1e-3  # of the largest entry of each column
 AT = 1  # the lane that is compared
 
 TERMS = {
-    "what follows in coordinates": ("put_lanes(x.y, (k,), y + of_y * by)", "pass"),
-    "what follows in velocities": ("put_lanes(x.u, (k,), u + of_u * by)", "pass"),
+    "what follows in coordinates": ("put_lanes(x.y, (k,), y + of_coordinate(ways, k) * by)", "pass"),
+    "what follows in velocities": ("put_lanes(x.u, (k,), u + ways.of_u * by)", "pass"),
     "accelerations": ("put_lanes(x.a, (k,), a + by)", "pass"),
 }
 
@@ -41,16 +42,17 @@ def both(model: FloatingModel, *modules: ModuleType) -> tuple[list[np.ndarray], 
     for part, values in zip(state.tried, residual_twin.state(model, 1), strict=True):
         part[:] = values[:, None]
     state.weight[:], solver.memory[newton.SCALE] = 1.0, 0.1
-    ways = BETA * STEP**2, GAMMA * STEP, 1.0
+    state.beta[:] = np.linspace(0.2, 0.3, N)[:, None]
+    ways = ways_of(state, Weights(0.0, GAMMA, 0.0, 0.0), np.full(LANES, STEP))
     found = []
     for module in modules:
-        module.tangent(model.system, lane, state, *(np.full(LANES, way) for way in ways[:2]), solver)
+        module.tangent(model.system, lane, state, ways, solver)
         found.append(solver.fresh[:, :, AT].copy())
     wanted, out = np.zeros((N, N)), np.zeros((N, LANES))
     for k in range(N):
         for sign in (1.0, -1.0):
             x = Coordinates(*(part.copy() for part in state.tried))
-            for part, way in zip(x, ways, strict=True):
+            for part, way in zip(x, (state.beta[k] * STEP**2, GAMMA * STEP, 1.0), strict=True):
                 part[k] += sign * way * 1e-3
             residual(model.system, lane, x, solver.work, out)
             wanted[:, k] += sign * out[:, AT] / 2e-3

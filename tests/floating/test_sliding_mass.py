@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from engine.floating.converge import converge, levels, stations, weights
+from engine.floating.converge import converge, levels
 from engine.floating.march import Marched, march
 from engine.floating.model import build
 from engine.floating.model_choice import choose
@@ -109,9 +109,8 @@ def test_when_something_slides_over_an_end_is_known_to_a_step() -> None:
     rung = choose(scene, values, duration, 30.0)
     found = converge(scene, values, duration, 30.0, rung)
     level = next(one for one in levels(scene, 30.0, rung.modes) if one.steps == found.steps.max())
-    count = 8 * level.steps
-    marched = march(level.model, values, duration, count, stations(level) * 8, weights(level.scheme))
-    wanted = marched.last * 30.0 / count
+    fine = replace(level, steps=8 * level.steps, every=8 * level.every)
+    wanted = fine.march(values, duration).numbers["duration"]
     off = np.abs(found.outcome.numbers["duration"] / wanted - 1.0)
     assert (wanted < 29.0).all()
     assert off.max() > 1e-4

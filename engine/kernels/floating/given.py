@@ -5,8 +5,8 @@ base + x'' + U x' + Y x: gyroscopic, Euler and centrifugal terms. The modes of a
 
     sum_j int phi_i . (phi_j q_j'' + U phi_j q_j' + Y phi_j q_j) dm + d_i q_i' + k_ij q_j = -int phi_i . base dm
 
-and with what a carriage needs at its place, (10)-(21). In a step q = q* + of_y q'' and q' = q'* + of_u q'', so that
-T = 1 + of_u U + of_y Y stands for 1 in the mass matrix. What a carriage stiffens a track by is
+and with what a carriage needs at its place, (10)-(21). In a step q_j = q_j* + of_y q_j'' and q' = q'* + of_u q'', of_y
+of each coordinate, so that 1 + of_u U + of_y Y stands for 1 in the mass matrix. What a carriage stiffens a track by is
 linear in them, and directions of torques follow them in first order.
 """
 
@@ -37,7 +37,7 @@ from engine.kernels.floating.layout import (
     WEIGHT,
 )
 from engine.kernels.floating.loads import load_at
-from engine.kernels.floating.state import advance, factor, solve
+from engine.kernels.floating.state import advance, factor, of_coordinate, solve, ways_of
 from engine.kernels.floating.tracks import CURVE, SHAPE, SLOPE, pulled_nearer, shapes_at, weighed
 from engine.kernels.floating.vectors import (
     add,
@@ -56,11 +56,9 @@ from engine.kernels.floating.work import (
     ANGULAR,
     CONTACT,
     RATES,
-    SLIDING,
     SPIN,
     TOUCHED,
     VALUES,
-    WHOLE,
     add_to,
 )
 from engine.kernels.jit import called
@@ -70,8 +68,7 @@ from engine.kernels.vector import all_lanes, lanes_at, put_lanes
 @called
 def step_given(system, lane, scheme, h, state, solver):
     """One step of all lanes; 1 in the lanes in which its equations are regular, else 0."""
-    of_new = (1.0 - scheme.alpha_f) / (1.0 - scheme.alpha_m)
-    ways, N = (scheme.beta * of_new * h * h, scheme.gamma * of_new * h), state.residual.shape[0]
+    ways, N = ways_of(state, scheme, h), state.residual.shape[0]
     for k in range(N):
         put_lanes(state.tried.a, (k,), all_lanes(0.0))
         put_lanes(state.residual, (k,), all_lanes(0.0))
@@ -83,7 +80,7 @@ def step_given(system, lane, scheme, h, state, solver):
             follow_frame(system, lane, b, state.tried, solver.work)
     for b in range(system.tree.shape[0]):
         if system.tree[b, MODES]:
-            turning(b, ways, solver.work)
+            turning(b, solver.work)
             body(system, lane, b, ways, state, solver)
     for k in range(system.pairing.shape[0]):
         pair(system, k, ways, state, solver)
@@ -102,9 +99,8 @@ def step_given(system, lane, scheme, h, state, solver):
 
 
 @called
-def turning(b, ways, work):
-    """U, Y and T of a body's frame into work.turning."""
-    of_y, of_u = ways
+def turning(b, work):
+    """U and Y of a body's frame into work.turning."""
     w, al = vector(work.frames, b, SPIN), vector(work.frames, b, ANGULAR)
     zero = all_lanes(0.0)
     by_rate = (
@@ -114,9 +110,6 @@ def turning(b, ways, work):
     )
     keep_matrix(work.turning, b, RATES, by_rate)
     keep_matrix(work.turning, b, VALUES, turned_by(w, al))
-    for e in range(9):
-        part = of_u * lanes_at(work.turning, (b, RATES + e)) + of_y * lanes_at(work.turning, (b, VALUES + e))
-        put_lanes(work.turning, (b, WHOLE + e), part + (1.0 if e % 4 == 0 else 0.0))
 
 
 @called
@@ -134,7 +127,7 @@ def body(system, lane, b, ways, state, solver):
                     by = system.modes[row, FIRST_ORDER + 3 * e + a]
                     left = left + by * lanes_at(work.turning, (b, VALUES + 3 * a + e))
         add_to(state.residual, k, left)
-        add_to_matrix(solver.fresh, k, k, ways[1] * damping)
+        add_to_matrix(solver.fresh, k, k, ways.of_u * damping)
 
 
 @called
@@ -143,20 +136,19 @@ def pair(system, number, ways, state, solver):
     b, i, j = system.pairing[number, 0], system.pairing[number, 1], system.pairing[number, 2]
     widest, first, work = system.track.shape[4], system.tree[b, FIRST], solver.work
     row, k, m = (b * widest + i) * widest + j, first + i, first + j
-    by_rate, by_value = all_lanes(0.0), all_lanes(system.pairs[row, STIFFNESS])
+    mass, by_rate, by_value = 0.0, all_lanes(0.0), all_lanes(system.pairs[row, STIFFNESS])
     if system.tree[b, SHORTENED]:
         turning, base = matrix(work.turning, b, VALUES), vector(work.frames, b, ACCELERATION)
         by_value = by_value - turned_nearer(system, b, row, turning) - pulled(system, b, row, base)
-    whole = ways[0] * by_value
     for a in range(3):
+        mass += system.pairs[row, SECOND_ORDER + 4 * a]
         for e in range(3):
             if system.leans[b, a] and system.leans[b, e]:
                 both = system.pairs[row, SECOND_ORDER + 3 * a + e]
-                whole = whole + both * lanes_at(work.turning, (b, WHOLE + 3 * a + e))
                 by_rate = by_rate + both * lanes_at(work.turning, (b, RATES + 3 * a + e))
                 by_value = by_value + both * lanes_at(work.turning, (b, VALUES + 3 * a + e))
     add_to(state.residual, k, by_rate * lanes_at(state.tried.u, (m,)) + by_value * lanes_at(state.tried.y, (m,)))
-    add_to_matrix(solver.fresh, k, m, whole)
+    add_to_matrix(solver.fresh, k, m, mass + ways.of_u * by_rate + of_coordinate(ways, m) * by_value)
 
 
 @called
@@ -170,7 +162,6 @@ def carriage(system, lane, c, ways, state, solver):
     acceleration, mass = acceleration_at(system, work, b, d, rate, change), carried(lane, c, OWN_MASS)
     keep_vector(work.contacts, c, TOUCHED, acceleration)
     f = times(mass, acceleration)
-    sliding(b, along, ways, work)
     for j in range(n):
         keep_vector(work.implied, row + j, 0, implied(system, b, j, along, ways, work))
     if z >= 0:
@@ -208,11 +199,12 @@ def sprung(system, lane, c, ways, state, solver):
     by_rate, by_value = column(work.turning, b, RATES + 2), column(work.turning, b, VALUES + 2)
     acceleration = add(vector(work.contacts, c, TOUCHED), add(times(u, by_rate), times(y, by_value)))
     keep_vector(work.contacts, c, CONTACT, acceleration)
-    f, rising = times(own, acceleration), column(work.turning, b, WHOLE + 2)
+    of_y, up = of_coordinate(ways, z), (all_lanes(0.0), all_lanes(0.0), all_lanes(1.0))
+    f, rising = times(own, acceleration), add(up, add(times(ways.of_u, by_rate), times(of_y, by_value)))
     keep_vector(work.implied, row + system.track.shape[4], 0, rising)
     spring, damper = carried(lane, c, SPRING), carried(lane, c, DAMPER)
     add_to(state.residual, z, f[2] + spring * y + damper * u)
-    add_to_matrix(solver.fresh, z, z, own * rising[2] + ways[0] * spring + ways[1] * damper)
+    add_to_matrix(solver.fresh, z, z, own * rising[2] + of_y * spring + ways.of_u * damper)
     for i in range(system.tree[b, MODES]):
         k = system.tree[b, FIRST] + i
         add_to_matrix(solver.fresh, k, z, own * dot(vector(work.modes, i, SHAPE), rising))
@@ -233,24 +225,20 @@ def column(table, i, k):
 
 
 @called
-def sliding(b, along, ways, work):
-    """What slopes under a carriage that slides over them add to its acceleration, as T of displacements."""
-    (of_y, of_u), (_, ds, dds) = ways, along
-    for e in range(9):
-        part = of_y * ds * lanes_at(work.turning, (b, RATES + e))
-        put_lanes(work.turning, (b, SLIDING + e), part + 2.0 * of_u * ds + of_y * dds if e % 4 == 0 else part)
-
-
-@called
 def implied(system, b, j, along, ways, work):
-    """What the acceleration of mode j adds to that of the contact, at the step's end."""
-    found = times(ways[0] * along[1] * along[1], vector(work.modes, j, CURVE))
+    """What the acceleration of mode j adds to that of the contact, at the step's end: itself, by its rate and by its
+    value, where slopes slide by."""
+    _, ds, dds = along
+    shape, slope = vector(work.modes, j, SHAPE), vector(work.modes, j, SLOPE)
+    by_rate = times(2.0 * ds, slope)
+    by_value = add(times(ds * ds, vector(work.modes, j, CURVE)), times(dds, slope))
     for e in range(3):
         if system.leans[b, e]:
-            shape, slope = lanes_at(work.modes, (j, SHAPE + e)), lanes_at(work.modes, (j, SLOPE + e))
-            found = add(found, times(shape, column(work.turning, b, WHOLE + e)))
-            found = add(found, times(slope, column(work.turning, b, SLIDING + e)))
-    return found
+            by_rate = add(by_rate, times(shape[e], column(work.turning, b, RATES + e)))
+            by_value = add(by_value, times(shape[e], column(work.turning, b, VALUES + e)))
+            by_value = add(by_value, times(ds * slope[e], column(work.turning, b, RATES + e)))
+    of_y = of_coordinate(ways, system.tree[b, FIRST] + j)
+    return add(shape, add(times(ways.of_u, by_rate), times(of_y, by_value)))
 
 
 @called
@@ -262,10 +250,10 @@ def stiffen(system, b, pull, ways, state, solver):
             i, j = first + system.shortening[k, ONE], first + system.shortening[k, OTHER]
             by = -1.0 * pulled_nearer(system, k, pull, solver.work)
             add_to(state.residual, i, by * lanes_at(state.tried.y, (j,)))
-            add_to_matrix(solver.fresh, i, j, ways[0] * by)
+            add_to_matrix(solver.fresh, i, j, of_coordinate(ways, j) * by)
             if i != j:
                 add_to(state.residual, j, by * lanes_at(state.tried.y, (i,)))
-                add_to_matrix(solver.fresh, j, i, ways[0] * by)
+                add_to_matrix(solver.fresh, j, i, of_coordinate(ways, i) * by)
 
 
 @called
@@ -285,7 +273,7 @@ def load(system, lane, q, ways, state, solver):
             if system.tree[b, SHORTENED]:
                 by = by + weighed(system.grip_shorter, p, system.tree[b, SHORTENED], (i, j), f)
             left = left + by * lanes_at(state.tried.y, (first + j,))
-            add_to_matrix(solver.fresh, first + i, first + j, ways[0] * by)
+            add_to_matrix(solver.fresh, first + i, first + j, of_coordinate(ways, first + j) * by)
         add_to(state.residual, first + i, left)
 
 

@@ -149,12 +149,14 @@ class Lane(NamedTuple):
 
 
 class Weights(NamedTuple):
-    """A scheme: Newmark's beta and gamma, and generalized-alpha's alpha_m and alpha_f (0 of Newmark's family)."""
+    """A scheme: Newmark's beta and gamma, and generalized-alpha's alpha_m and alpha_f (0 of Newmark's family); raised:
+    whether beta is larger for each coordinate that is too fast for it."""
 
     beta: float
     gamma: float
     alpha_m: float
     alpha_f: float
+    raised: bool = False
 
 
 class Record(NamedTuple):

@@ -32,13 +32,14 @@ from engine.kernels.floating.layout import (
     Lane,
 )
 from engine.kernels.floating.motions import motions_at
-from engine.kernels.floating.newton import factor_masses, settle, solve_accelerations, step
+from engine.kernels.floating.newton import bound_masses, factor_masses, raise_beta, settle, solve_accelerations, step
 from engine.kernels.floating.observe import apart, observe, observe_whole, of_way
 from engine.kernels.floating.state import (
     CODE,
     EVENT,
     FRESH,
     MEMORY,
+    SCALE,
     TIME,
     Solver,
     State,
@@ -59,6 +60,8 @@ from engine.kernels.vector import all_lanes, choose, everywhere, lanes_at, put_l
 #: for each step, which saves one correction in four of a mass that slides.
 KEPT = 8
 MOST_BENT = 10.0  # lengths of a body: beyond, a march has diverged, whatever is wrong
+LOOKED = 8  # times of the march, besides its start, at which masses are looked at for what a step needs
+UNBOUNDED = 1e300  # kg, or alike
 NEAR = 1e-9  # of a step: an event so near to a station falls on it
 JUMP = 1e-12  # of a rate: below it is rounding
 LEFT, LEFT_BEFORE = 4, 3  # numbers of a tip; that of the last station, after the vector
@@ -197,9 +200,9 @@ def go_through(system, lane, scheme, number, state, solver):
 def room_to_march(system, lane, record):
     """Room for a block of lanes."""
     N, M = lane.start.shape[1], lane.motions.shape[0]
-    rows = np.zeros((11, N, LANES))
+    rows = np.zeros((12, N, LANES))
     now, tried = Coordinates(rows[0], rows[1], rows[2]), Coordinates(rows[3], rows[4], rows[5])
-    state = State(now, tried, rows[6], rows[7], rows[8], rows[9], rows[10])
+    state = State(now, tried, rows[6], rows[7], rows[8], rows[9], rows[10], rows[11])
     two, both = np.zeros((2, N, N, LANES)), np.zeros((2, M, 3, LANES))
     memory, signals = np.zeros((MEMORY, LANES)), np.zeros((record.statistics.shape[1], LANES))
     solver = Solver(room(system, lane), np.zeros((N, LANES)), two[0], two[1], both[0], both[1], memory)
@@ -222,7 +225,7 @@ def note_rest(system, state, solver, left):
 
 
 @called
-def start(system, lane, end, state, solver, left):
+def start(system, lane, scheme, end, state, solver, left):
     """A block of lanes at its start, with the accelerations there; before it where tips rest at the end, s."""
     work, memory = solver.work, solver.memory
     for k in range(state.weight.shape[0]):
@@ -248,7 +251,17 @@ def start(system, lane, end, state, solver, left):
         put_lanes(state.earlier, (k,), all_lanes(0.0))
     put_lanes(memory, (EVENT,), near_of(lane))
     next_events(lane.events, everyone, memory)
-    solve_accelerations(system, lane, everyone, state, solver)
+    for k in range(state.beta.shape[0]):
+        put_lanes(state.beta, (k,), all_lanes(UNBOUNDED if scheme.raised else scheme.beta))
+    for back in range(LOOKED if scheme.raised else 0, -1, -1):
+        put_lanes(memory, (SCALE,), all_lanes(0.0))
+        time = end * (back / LOOKED)
+        motions_at(lane.motions, time, time, work.piece, work.motions)
+        solve_accelerations(system, lane, everyone, state, solver)
+        if scheme.raised:
+            bound_masses(system, lane, state, solver)
+    if scheme.raised:
+        raise_beta(scheme, lanes_at(lane.step, (0,)), state, solver.other)
 
 
 @called
@@ -256,7 +269,7 @@ def march_block(system, lane, scheme, steps, block, room, record):
     """One block of lanes from the start to the end, its signals and codes into the record."""
     state, solver, signals, past, left = room
     work, memory, kept = solver.work, solver.memory, 0
-    start(system, lane, steps * lanes_at(lane.step, (0,)), state, solver, left)
+    start(system, lane, scheme, steps * lanes_at(lane.step, (0,)), state, solver, left)
     for number in range(steps + 1):
         if number:
             go_through(system, lane, scheme, number, state, solver)

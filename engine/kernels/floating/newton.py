@@ -9,22 +9,38 @@ so that its numbers do not depend on its neighbours.
 import numpy as np
 
 from engine.kernels.floating.equations import residual
-from engine.kernels.floating.layout import DIVERGED, FIRST, LENGTH, MASS, MODES, NOT_CONVERGED
+from engine.kernels.floating.layout import (
+    COORDINATE,
+    DIVERGED,
+    FIRST,
+    KIND,
+    LENGTH,
+    MASS,
+    MODES,
+    NOT_CONVERGED,
+    SPHERICAL,
+    SPRING,
+    SPRUNG_COORDINATE,
+    STIFFNESS,
+)
 from engine.kernels.floating.state import (
     CODE,
     DONE,
     FRESH,
     LAST,
     SCALE,
+    Ways,
     advance,
     factor,
     going_on,
     of,
+    of_coordinate,
     or_one,
     put_where,
     size_of,
     solve,
     sound,
+    ways_of,
 )
 from engine.kernels.floating.vectors import dot
 from engine.kernels.floating.work import three_at
@@ -37,6 +53,8 @@ SMALL, ENOUGH = 1e-6, 1e-10
 STALLED = 0.5  # a small correction that is no smaller than so much of the one before is rounding
 SLOW = 0.1  # a correction over the one before it, from which on the tangent of a lane is made anew
 MOST_ITERATIONS = 25
+SHARE = 0.5  # of the bounds of masses that steps may take: coordinates that move change the mass matrix
+POWERS, GOLDEN = 16, 0.618  # steps of the power method, from a vector that is along no mode
 STILL = 1e-9  # of a length within a step: what moves by less rests
 #: Of statics, whose coordinates are counted in lengths of their body, rad or m: by how much they are moved for
 #: differences, how far they go at most by a correction, and the correction at which the iteration ends, as the next
@@ -46,8 +64,8 @@ MOST_CORRECTIONS = 100
 
 
 @called
-def tangent(system, lane, state, of_y, of_u, solver):
-    """Derivative of the residual by the accelerations, coordinates and velocities following by of_y and of_u, into the
+def tangent(system, lane, state, ways, solver):
+    """Derivative of the residual by the accelerations, coordinates and velocities following in their ways, into the
     fresh matrix: the residual is linear in accelerations, and nearly so in what a step makes of them."""
     x, M = state.tried, solver.fresh
     N = M.shape[0]
@@ -55,8 +73,8 @@ def tangent(system, lane, state, of_y, of_u, solver):
     for k in range(N):
         by = PART * or_one(of(solver.memory, SCALE)) / lanes_at(state.weight, (k,))
         y, u, a = lanes_at(x.y, (k,)), lanes_at(x.u, (k,)), lanes_at(x.a, (k,))
-        put_lanes(x.y, (k,), y + of_y * by)
-        put_lanes(x.u, (k,), u + of_u * by)
+        put_lanes(x.y, (k,), y + of_coordinate(ways, k) * by)
+        put_lanes(x.u, (k,), u + ways.of_u * by)
         put_lanes(x.a, (k,), a + by)
         residual(system, lane, x, solver.work, state.residual)
         for i in range(N):
@@ -115,7 +133,7 @@ def factor_masses(system, lane, who, state, solver):
         put_lanes(state.tried.u, (k,), lanes_at(state.now.u, (k,)))
         put_lanes(state.tried.a, (k,), zero)
         put_where(who, state.weight, (k,), all_lanes(1.0))
-    tangent(system, lane, state, zero, zero, solver)
+    tangent(system, lane, state, Ways(zero, zero, state.beta), solver)
     least = least_scale(system, lane)
     put_lanes(memory, (SCALE,), choose(who & (least > kept), least, kept))
     put_where(who, memory, (FRESH,), zero)
@@ -123,6 +141,81 @@ def factor_masses(system, lane, who, state, solver):
         own = lanes_at(solver.fresh, (k, k))
         put_where(who, state.weight, (k,), root(size_of(own)))
     return factor(solver.fresh)
+
+
+@called
+def own_stiffness(system, lane, out):
+    """Of each coordinate by itself, into out (N, LANES): of modes, of springs that carry masses, and of joints."""
+    for k in range(out.shape[0]):
+        put_lanes(out, (k,), all_lanes(0.0))
+    widest = system.track.shape[4]
+    for b in range(system.tree.shape[0]):
+        for i in range(system.tree[b, MODES]):
+            row = (b * widest + i) * widest + i
+            put_lanes(out, (system.tree[b, FIRST] + i,), all_lanes(system.pairs[row, STIFFNESS]))
+    for c in range(system.riders.shape[0]):
+        if system.riders[c, SPRUNG_COORDINATE] >= 0:
+            put_lanes(out, (system.riders[c, SPRUNG_COORDINATE],), lanes_at(lane.carriages, (c, SPRING)))
+    for j in range(system.joint_table.shape[0]):
+        if system.joint_table[j, COORDINATE] >= 0 and system.joint_table[j, KIND] != SPHERICAL:
+            put_lanes(out, (system.joint_table[j, COORDINATE],), lanes_at(lane.joints, (j, 0)))
+
+
+@called
+def bound_masses(system, lane, state, solver):
+    """Numbers c of coordinates that have a stiffness, with M > diag(c) for the mass matrix whose factors are the fresh
+    ones, into the state's beta, where they are less than what stands there: 1/c_i = P_ii times the largest eigenvalue
+    of P_ij/sqrt(P_ii P_jj), P = M^-1 of these coordinates."""
+    P, K, column, N = solver.matrix, solver.other, state.residual, state.beta.shape[0]
+    own_stiffness(system, lane, K)
+    for j in range(N):
+        for i in range(N):
+            put_lanes(column, (i,), all_lanes(1.0 if i == j else 0.0))
+        solve(solver.fresh, column)
+        for i in range(N):
+            counts = (lanes_at(K, (i,)) > 0.0) & (lanes_at(K, (j,)) > 0.0)
+            put_lanes(P, (i, j), choose(counts, lanes_at(column, (i,)), 1.0 if i == j else 0.0))
+    largest = largest_eigenvalue(P, column, state.tried.u)
+    for i in range(N):
+        bound, least = 1.0 / (largest * lanes_at(P, (i, i))), lanes_at(state.beta, (i,))
+        bound = choose(bound > 0.0, bound, 0.0)  # 0 of NaN too
+        put_lanes(state.beta, (i,), choose(bound < least, bound, least))
+
+
+@called
+def largest_eigenvalue(P, x, y):
+    """Of P_ij/sqrt(P_ii P_jj), by so many steps of the power method; x, y (N, LANES): room."""
+    N = P.shape[0]
+    for i in range(N):
+        put_lanes(x, (i,), all_lanes(1.0 + (i * GOLDEN) % 1.0))
+    found = all_lanes(1.0)
+    for _ in range(POWERS):
+        size = all_lanes(0.0)
+        for i in range(N):
+            whole = all_lanes(0.0)
+            for j in range(N):
+                whole = whole + lanes_at(P, (i, j)) * (lanes_at(x, (j,)) / root(lanes_at(P, (j, j))))
+            whole = whole / root(lanes_at(P, (i, i)))
+            put_lanes(y, (i,), whole)
+            size = size + whole * whole
+        found = root(size)
+        for i in range(N):
+            put_lanes(x, (i,), lanes_at(y, (i,)) / found)
+    return found
+
+
+@called
+def raise_beta(scheme, h, state, stiffness):
+    """Newmark's beta of each coordinate of a stiffness (N, LANES), from the bounds of its masses.
+
+    Where stiffness K couples no coordinates, y = h^2 (1/delta + beta) a, by central differences delta of a step, makes
+    s^2 (M + h^2 K (beta - 1/4)) + s C + K = 0 of M a + C v + K y = 0, with s = 2/h (z - 1)/(z + 1): it is stable while
+    M > diag(h^2 K (1/4 - beta)), whatever C >= 0 damps."""
+    for k in range(state.beta.shape[0]):
+        square, bound = h * h * lanes_at(stiffness, (k,)), SHARE * lanes_at(state.beta, (k,))
+        fast = square * (0.25 - scheme.beta) > bound
+        raised = 0.25 - bound / choose(fast, square, 1.0)
+        put_lanes(state.beta, (k,), choose(fast, raised, scheme.beta))
 
 
 @called
@@ -148,8 +241,7 @@ def renew(system, lane, scheme, h, state, solver):
     stale = (of(memory, FRESH) < 0.5) & (of(memory, DONE) < 0.5)
     if everywhere((of(memory, FRESH) > 0.5) | (of(memory, DONE) > 0.5)):
         return
-    of_new = (1.0 - scheme.alpha_f) / (1.0 - scheme.alpha_m)
-    tangent(system, lane, state, scheme.beta * of_new * h * h, scheme.gamma * of_new * h, solver)
+    tangent(system, lane, state, ways_of(state, scheme, h), solver)
     regular = factor(new)
     for i in range(M.shape[0]):
         for j in range(M.shape[0]):

@@ -12,8 +12,8 @@ from engine.kernels.vector import all_lanes, choose, lanes_at, put_lanes
 
 class State(NamedTuple):
     """A block of lanes under way: where it is, and where it is tried to be at the end of the step; all (N, LANES):
-    accelerations of generalized-alpha, those of the step before, the residual, and how heavy each coordinate is,
-    kg^(1/2) or alike."""
+    accelerations of generalized-alpha, those of the step before, the residual, how heavy each coordinate is,
+    kg^(1/2) or alike, and its beta."""
 
     now: Coordinates
     tried: Coordinates
@@ -22,6 +22,7 @@ class State(NamedTuple):
     earlier: FloatArray
     residual: FloatArray
     weight: FloatArray
+    beta: FloatArray
 
 
 class Solver(NamedTuple):
@@ -35,6 +36,14 @@ class Solver(NamedTuple):
     before: FloatArray
     after: FloatArray
     memory: FloatArray
+
+
+class Ways(NamedTuple):
+    """How coordinates and velocities follow accelerations in a step: by of_y beta (N, LANES) and by of_u."""
+
+    of_y: FloatArray
+    of_u: FloatArray
+    beta: FloatArray
 
 
 # rows of Solver.memory: largest weighted acceleration so far, 1 where the tangent is of use, the last correction, 1
@@ -100,12 +109,25 @@ def solve(M, x):
 def advance(state, scheme, h):
     """Coordinates and velocities by the accelerations that are tried: Newmark's formulas with those of
     generalized-alpha, (1 - m) inner_new + m inner = (1 - f) a_new + f a."""
-    beta, gamma = scheme.beta, scheme.gamma
-    x, new = state.now, state.tried
+    gamma, x, new = scheme.gamma, state.now, state.tried
     for k in range(state.inner.shape[0]):
+        beta = lanes_at(state.beta, (k,))
         own, inner, u = inner_of(state, scheme, k), lanes_at(state.inner, (k,)), lanes_at(x.u, (k,))
         put_lanes(new.y, (k,), lanes_at(x.y, (k,)) + h * u + h * h * ((0.5 - beta) * inner + beta * own))
         put_lanes(new.u, (k,), u + h * ((1.0 - gamma) * inner + gamma * own))
+
+
+@called
+def ways_of(state, scheme, h):
+    """How coordinates and velocities follow accelerations in a step h of a scheme."""
+    of_new = (1.0 - scheme.alpha_f) / (1.0 - scheme.alpha_m)
+    return Ways(of_new * h * h, scheme.gamma * of_new * h, state.beta)
+
+
+@called
+def of_coordinate(ways, k):
+    """How a coordinate follows its acceleration."""
+    return lanes_at(ways.beta, (k,)) * ways.of_y
 
 
 @called

@@ -20,9 +20,8 @@ RIGID = 12  # of Work.rigid: attitude and position alone
 JOINT_TURNED, JOINT_SHIFT, JOINT_DRIVE, JOINT = 0, 9, 12, 13
 # columns of Work.contacts: force of the track on a carriage, and acceleration of the point that it touches less gravity
 CONTACT, TOUCHED, CONTACTS = 0, 3, 6
-# columns of Work.turning: of a frame that is given, what rates and values of a place do to its acceleration, and both
-# with the acceleration itself, at the end of a step; what slopes do to that of the carriage that was looked at last
-RATES, VALUES, WHOLE, SLIDING, TURNING = 0, 9, 18, 27, 36
+# columns of Work.turning: of a frame that is given, what rates and values of a place do to its acceleration
+RATES, VALUES, TURNING = 0, 9, 18
 
 
 class Work(NamedTuple):

@@ -5,11 +5,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.floating.converge import Level, converge, levels, stations, weights
-from engine.floating.march import march
+from engine.floating.converge import Level, converge, levels
 from engine.floating.model import build
 from engine.floating.model_choice import choose
-from engine.floating.results import differences, outcome, results_of
+from engine.floating.results import differences, results_of
 from engine.scene.study import Study
 from engine.scene.sweep import expand
 from engine.scene.variants import VariantValues
@@ -58,8 +57,7 @@ def test_told_errors_are_above_those_beside_many_elements(elements: int) -> None
     found = converge(scene, values, duration, TIME, rung)
     fine = [level for level in levels(rung.of(scene), TIME, rung.modes) if level.steps >= found.steps.max()][1]
     whole = Level(build(rung.of(many.without_sweep()), rung.modes), fine.steps, fine.every, fine.scheme)
-    exact = march(whole.model, values, duration, whole.steps, stations(whole), weights(whole.scheme))
-    true = differences(whole.model, found.outcome, outcome(whole.model, exact))
+    true = differences(whole.model, found.outcome, whole.march(values, duration))
     held = np.isfinite([result.tolerance for result in results_of(whole.model)])
     assert true[held].max() > 1e-3 and np.isin(found.status, [Status.OK, Status.BEYOND_THEORY]).all()
     matter = true > 1e-4
