@@ -70,7 +70,8 @@ def _in_words(results: Results, one: _Missed) -> str:
         noun, units = f"the {kind} of {name}", "Pa" if kind == "stress" else "m"
     off = quantity(float(error[one.at]), units, 2)
     when = f", most in doubt at {quantity(one.time, 's')}" if np.isfinite(one.time) else ""
-    return f"{noun} (estimated to within {percent(one.error)}, {off},{in_words(results, one.at)}{when})"
+    where = in_words(results, one.at)
+    return f"{noun} (estimated to within {percent(one.error)}, {off}{where and ','}{where}{when})"
 
 
 def model_of(results: Results, at: Index) -> RobotModel:
@@ -88,7 +89,7 @@ def _refined(results: Results, at: Index) -> str:
     modes, steps = (int(results.dataset[f"{name}_used"].values[at]) for name in ("modes", "steps"))
     return (
         f"What was marched there, {modes} modes of all rails and {steps:,} steps, is the most that is tried. "
-        "What helps: a larger solver.tolerance, slower moves, or smaller payloads."
+        "What helps: a larger solver.tolerance, slower moves, smaller payloads, or more steps (solver.steps)."
     )
 
 

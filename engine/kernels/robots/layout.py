@@ -21,20 +21,8 @@ FIRST, MODES, ELEMENTS = range(3)
 START, JERK, RAMP, UP, STEADY, MOVE = 0, 1, 2, 3, 4, 5
 
 # columns of Work.links, by joint: link in space; joint as it is and as planned (value, rate, acceleration); what its
-# drive is told, and exerts; its plan when the matrix was made
-PLACE, TURN, AXIS, FORCE, MOMENT, ACTUAL, PLANNED, TOLD, DRIVE, SINCE, COLUMNS = (
-    0,
-    3,
-    12,
-    15,
-    18,
-    21,
-    24,
-    27,
-    28,
-    29,
-    30,
-)
+# drive is told, and exerts
+PLACE, TURN, AXIS, FORCE, MOMENT, ACTUAL, PLANNED, TOLD, DRIVE, COLUMNS = 0, 3, 12, 15, 18, 21, 24, 27, 28, 29
 VALUE, RATE, PUSH = range(3)
 # columns of Work.robots: tool centre points, motion of the base per unit rate of joint 0, wrench on it (of its moment
 # what does work along the rotation vector), payload, rotation vector of the base
