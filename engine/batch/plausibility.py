@@ -284,7 +284,9 @@ def _light(plan: Plan) -> Iterator[str]:
     for body, part in enumerate(plan.base.bodies):
         loads = {number: tie.name for number, tie in enumerate(plan.base.carriages) if tie.body == body}
         share, load = max(_pressing(grid, body, loads) for grid in plan.grids)
-        if 0.0 < share < LIGHT and not any(_weighs_with_unit(study, name) for name in loads.values()):
+        if 0.0 < share < LIGHT and not any(
+            _weighs_with_unit(study, name) or _is_loaded(study, name) for name in loads.values()
+        ):
             names = dict.fromkeys(study.source.written(f"carriage.{name}").replace(".", " ") for name in loads.values())
             masses = any(study.carriage[name].reacts for name in loads.values())
             press = "loads of {} together press" if len(loads) > 1 else "load of {} presses"
@@ -293,6 +295,11 @@ def _light(plan: Plan) -> Iterator[str]:
                 f"{part.name}, {_newtons(load / share)}: "
                 f"{'are the units right?' if masses else 'were kilonewtons meant?'}"
             )
+
+
+def _is_loaded(study: Study, name: str) -> bool:
+    """Whether further carriages go along the body that rides as one."""
+    return any(other.on == study.carriage[name].riding_body for other in study.carriage.values())
 
 
 def _pressing(grid: SceneGrid, body: int, carriages: Iterable[int]) -> tuple[float, float]:

@@ -160,7 +160,8 @@ def _events(motions: Array) -> Array:
 
 
 def _stops(model: FloatingModel, motions: Array) -> Array:
-    """(V, T) times at which the last joint that carries a tip comes to its end; infinite where one never does."""
+    """(V, T) times at which the last joint that carries a tip comes to its end, infinite where one never does, and what
+    goes along these bodies, where it does."""
     found = np.zeros((len(motions), len(model.tips)))
     moving = np.any(motions[..., CONSTANT + 1 : AMPLITUDE] != 0.0, axis=-1) | (motions[..., AMPLITUDE] != 0.0)
     after = np.concatenate([motions[:, :, 1:, START], np.full((*motions.shape[:2], 1), np.inf)], axis=2)
@@ -168,7 +169,10 @@ def _stops(model: FloatingModel, motions: Array) -> Array:
     for t, sensor in enumerate(model.tips.values()):
         carriers = model.carriers(str(sensor.body))
         own = [joint.motion for joint in model.joints if joint.body in carriers]
-        found[:, t] = ends[:, own].max(axis=1, initial=0.0)
+        keys = [f"carriage.{name}.motion" for name, one in model.study.carriage.items() if one.on in carriers]
+        riding = ends[:, [model.motions.index(key) for key in keys if key in model.motions]]
+        last = np.where(np.isfinite(riding), riding, 0.0).max(axis=1, initial=0.0)
+        found[:, t] = np.maximum(ends[:, own].max(axis=1, initial=0.0), last)
     return found
 
 

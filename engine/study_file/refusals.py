@@ -17,6 +17,7 @@ from results_schema.registry import ABSENT
 
 Keys = Sequence[str | int]
 
+NOT_SWEPT = ("question", "output")  # tables of what is told of results
 _TAGS = {NUMBER: "a number", WORD: "a word in quotes", LIST: "a list", TABLE: "a table"}
 _BOUNDS: tuple[tuple[type, str, str], ...] = ((Gt, "gt", ">"), (Ge, "ge", ">="), (Lt, "lt", "<"), (Le, "le", "<="))
 
@@ -140,7 +141,8 @@ def bad_input(detail: Any, model: type[Spec], data: Any, source: Source) -> BadI
     bound = any(name in context for _, name, _ in _BOUNDS)
     remedy = place.hint if place and bound else nearest(detail["input"], [str(word) for word in words])
     remedy = remedy or _misplaced(model, data, keys)
-    if not remedy and place and isinstance(detail["input"], list) and "a list" not in expected:
+    is_of_scene = keys[0] not in NOT_SWEPT
+    if not remedy and place and is_of_scene and isinstance(detail["input"], list) and "a list" not in expected:
         remedy = f'to vary it: [sweep] NAME = {{ of = "{".".join(map(str, keys))}", values = {received} }}'
     return BadInput(_what(detail), where=where, expected=expected or detail["msg"], received=received, remedy=remedy)
 

@@ -278,7 +278,8 @@ def show_comparison(found: Comparison) -> None:
         paragraphs(f"Equal in every variant: {_some(same)}.")
     paragraphs("They agree within their estimated errors." if found.agree else "They differ.")
     if not found.agree and not (found.statuses or found.only_in_one or any(one.beyond for one in apart)):
-        paragraphs("Wherever errors are told they explain it.")
+        without = _some([one.name for one in apart if one.unknown])
+        paragraphs(f"Wherever errors are told they explain it; none is told of {without}, whose differences count.")
     blurred = [one.name for one in apart if one.blurred and not one.beyond]
     if blurred:
         paragraphs(

@@ -30,7 +30,7 @@ def errors(dataset: xr.Dataset) -> xr.Dataset:
     if "estimated_error" not in results.dataset or not results.study.output.keeps_variants:
         return xr.Dataset(attrs={"title": "no estimates of errors"})
     for name, sensor, array in single_numbers(results.dataset):
-        if set(array.dims) == set(results.dims) and f"{name} {sensor}".strip() in results.dataset["result"].values:
+        if set(array.dims) == set(results.dims) and _told_as(name, sensor) in results.dataset["result"].values:
             attributes = {"long_name": f"estimated error of {name}", "units": _unit(results, array, sensor)}
             values = array.transpose(*results.dims)
             own = values.copy(data=absolute_errors(results, name, sensor)).where(values.notnull())
@@ -64,13 +64,18 @@ def absolute_errors(results: Results, name: str, sensor: str = "") -> Array:
     their body along its track. An archive tells the static one where it has their dynamic amplification; else their own
     largest value stands for it, which is not far from it but near a resonance.
     """
-    own = name in (*OF_TOOLS, *OF_RAILS)
-    told = f"{name.partition('_')[0]} of {sensor}" if own else f"{name} {sensor}".strip()
-    error, (known, reported) = results.estimated_error(told), _scales(results, name, sensor)
+    error, (known, reported) = results.estimated_error(_told_as(name, sensor)), _scales(results, name, sensor)
     # What is reported is off itself: the true one, which errors are parts of, may be larger by as much.
     return error * np.fmax(
         results.everywhere(known), results.everywhere(reported) / np.maximum(1.0 - error, LEAST_PART)
     )
+
+
+def _told_as(name: str, sensor: str) -> str:
+    """The name of a result among those whose errors are estimated."""
+    if name in (*OF_TOOLS, *OF_RAILS):
+        return f"{name.partition('_')[0]} of {sensor}"
+    return f"{name} {sensor}".strip()
 
 
 def errors_of_size(results: Results, sensor: str) -> Array:

@@ -10,6 +10,7 @@ from engine.scene.study import Study
 from results_schema.arrays import Array
 from results_schema.lazy_imports import xr
 from results_schema.variable import outputs
+from studies.findings.theory import moves_away
 from studies.results.axes import Axis
 from studies.results.formatting import ROUNDING
 from studies.results.places import Index, extreme
@@ -61,10 +62,12 @@ def beside(results: Results, values: Array, place: Index, axis: Axis) -> Array:
 def told_amplification(results: Results, sensor: str) -> Array:
     """The dynamic amplification of a sensor that sentences and figures tell, in the sweep's shape; NaN throughout where
     statics are no measure of what it reads: across gravity, of a body that carriages push along its track or across it
-    by their inertia, which no static value counts."""
+    by their inertia, which no static value counts, and of a body that moves away as nothing holds it."""
     own, body = results.study.sensor[sensor], results.study.body_of(sensor)
     pushed = any(one.on == body and one.pushes for one in results.study.carriage.values())
     aside = own.side is not None or (own.point is not None and not results.study.body[body].deflects_down(own.point))
+    if body == results.carriage.on and moves_away(results):
+        return np.full(results.shape, np.nan)
     if pushed and (aside or own.way[:2] != (0.0, 0.0)):
         return np.full(results.shape, np.nan)
     return results.numbers("dynamic_amplification", sensor)

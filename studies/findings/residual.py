@@ -31,7 +31,11 @@ LEAST_STEP = 0.1  # of the largest value: smaller ones do not count as up or dow
 
 
 def check_residual(study: Study, asked: AskedOfRest) -> None:
-    """Refuse limits of residual vibrations and settling times that are not told. Raises BadInput."""
+    """Refuse residual vibrations of statics, and limits of them and of settling times that are not told. Raises
+    BadInput."""
+    if study.output.residual and study.solver.fidelity == "static":
+        what, expected = "statics do not swing on, so that nothing is known of residual vibrations", '"auto", or none'
+        raise study.source.fault("solver.fidelity", what, expected=expected, received="static")
     if any(asked.residual.limit(name) is not None for name in LIMITED) and not study.output.residual:
         what = "a limit of residual vibrations, which this study does not tell"
         raise study.source.fault("question.residual", what, expected="[output] residual = true beside it")

@@ -172,6 +172,11 @@ def body_mass(results: Results, name: str) -> float:
     return float(build_body(results.study.body[name]).mass if recorded is None else recorded["mass"])
 
 
+def moves_away(results: Results) -> bool:
+    """Whether nothing holds the first carriage's body fully."""
+    return _rigid_modes(results) > 0
+
+
 def _rigid_modes(results: Results) -> int:
     """Number of rigid-body modes of the first carriage's body."""
     recorded = results.recorded(results.carriage.on)

@@ -118,7 +118,8 @@ def _position_error(results: Results, sensor: str, beyond: str) -> Iterator[str]
     yield f"{sensor}: {what}, from where the rigid arm would have it, is {most}.{beyond}"
     if after:
         settles = _settles(results, sensor)
-        yield f"After the stop it is still up to {after}.{_beyond_after(results, sensor)}{settles}"
+        sag = ", with what it sags by weight at rest" if settles and np.any(results.parameter("gravity")) else ""
+        yield f"After the stop it is still up to {after}{sag}.{_beyond_after(results, sensor)}{settles}"
 
 
 def _settles(results: Results, sensor: str) -> str:

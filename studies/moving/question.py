@@ -13,7 +13,7 @@ from studies.findings.beyond import Limits
 
 
 class AfterStop(Spec):
-    """Limits of readings from then on where all joints that carry a place have come to their ends."""
+    """Limits of readings from then on where what moves a place has come to its end."""
 
     position_error: Annotated[Length, Field(gt=0)] | None = None
 

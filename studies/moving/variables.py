@@ -27,8 +27,8 @@ WORD_OF = {"max": "largest", "min": "smallest"}
 AT_STATIONS, BETWEEN = "over all stations", "over all stations and, by parabolas, between them"
 SLIDING = "over all stations and, where it slides by itself, by parabolas between them"
 OF_STOPS = (
-    "of a position error, from then on where all joints that carry it have come to their ends; NaN where that is not "
-    "within the time"
+    "of a position error, from then on where all joints that carry it, and what goes along their bodies to an end, "
+    "have come to it; NaN where that is not within the time"
 )
 OF_SENSORS = f"{BETWEEN} (of velocities and accelerations at stations alone)"
 

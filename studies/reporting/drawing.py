@@ -95,7 +95,9 @@ def page_of(study: Study, remarks: Sequence[str]) -> SimpleNamespace:
     return SimpleNamespace(
         title=study.title or study.kind,
         facts=[Row("kind of study", study.kind), Row("variants", f"{variants:,}"), *trains],
-        remarks=[f"{text[0].upper()}{text[1:]}." for text in (*remarks, *unused)],
+        remarks=[
+            f"{text[0].upper()}{text[1:].rstrip('.')}{'' if text[-1] == '?' else '.'}" for text in (*remarks, *unused)
+        ],
         figures=drawn,
         shapes=[*(_of_body(model, body) for body in scene.bodies.values() if _moves(study, body)), *_of_whole(model)],
         tables=[
