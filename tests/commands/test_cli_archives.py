@@ -186,6 +186,7 @@ def test_compare_tells_what_differs(here: Path, capsys: Captured) -> None:
     shown = output(capsys, "compare", "small.nc", "damped.nc", code=3)
     assert "body.beam.damping_ratio" in shown and "midspan_max" in shown and "They differ" in shown
     assert "agree within" in output(capsys, "compare", "small.nc", "small.nc")
+    assert "Wherever errors are told" not in shown
     assert main(["compare", "small.nc", "other.nc"]) == 2
     assert "received speed, mass in the first, speed in the second" in capsys.readouterr().err
     apart = open_archive("finer.nc").root.midspan_max - open_archive("small.nc").root.midspan_max

@@ -245,3 +245,10 @@ def test_a_contact_force_is_told_as_a_part_of_the_weight_too_where_masses_differ
     (told,) = (text for text in studies.answer(found) if "keeps its contact" in text)
     assert f"the smallest contact force is {quantity(float(force[0]), 'N')}" in told
     assert told.endswith(f"at mass 20 kg; over the weight it is smallest at mass 200 kg: {heavy:.3g}.")
+
+
+def test_a_body_that_nothing_holds_has_no_static_value() -> None:
+    """It moves away: "44,200 times the static value" was said of it."""
+    for supports, says in (("free-free", False), ("pinned-pinned", True)):
+        said = " ".join(studies.answer(studies.run(built(beam(supports=supports), mass(0.2, cruise(0.0, 1.0, 0.5))))))
+        assert ("times the static" in said) == says, said

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import studies
+from results_schema.errors import BadInput
 from studies.reporting import answers
 from studies.reporting.summary import in_tables
 from studies.results.formatting import listed
@@ -152,3 +153,8 @@ def test_what_a_variant_has_not_has_no_error() -> None:
     np.testing.assert_array_equal(
         np.isnan(studies.errors(found).midspan_residual.values), np.isnan(found.midspan_residual)
     )
+
+
+def test_statics_tell_no_residual_vibration() -> None:
+    with pytest.raises(BadInput, match=r"solver\.fidelity: statics do not swing on"):
+        studies.run(stops(solver={"fidelity": "static"}))

@@ -54,6 +54,16 @@ def test_a_sweep_has_every_variant_as_it_is_alone(found: Any) -> None:
     assert (found["cycle_time"].diff("acceleration") < 0.0).all()
 
 
+def test_errors_are_told_in_units_of_results(found: Any) -> None:
+    """Of what tools are off over the longest of all, of deflections over their own."""
+    errors, parts = studies.errors(found), found.estimated_error.sel(result="error of portal")
+    own = errors.error_moving.sel(robot="portal")
+    longest = np.fmax(found.error_moving, np.fmax(found.error_working, found.error_holding)).sel(robot="portal")
+    known = own.notnull()
+    np.testing.assert_allclose(own.values[known], (parts * longest / (1.0 - parts)).values[known], rtol=1e-6)
+    assert known.any() and set(errors.data_vars) >= {"error_moving", "error_holding", "deflection_largest"}
+
+
 @pytest.mark.fault(22)
 def test_a_variant_that_falls_over_has_no_values(found: Any) -> None:
     """By a million times its payload, which no joint holds up; results and histories of the others stay."""

@@ -297,6 +297,22 @@ def test_each_tip_stops_with_the_joints_that_carry_it() -> None:
 
 
 @pytest.mark.parametrize(
+    ("motion", "stop"),
+    [
+        ({"kind": "waypoints", "times": [0, 0.8], "positions": [0.5, 1.5]}, 0.8),
+        ({"kind": "waypoints", "times": [0, 0.3], "positions": [0.5, 1.5]}, 0.5),
+    ],
+    ids=["later", "sooner"],
+)
+def test_a_tip_stops_with_what_slides_along_the_bodies_that_carry_it(motion: dict[str, object], stop: float) -> None:
+    load = {"on": "upper", "kind": "mass", "mass": 0.4, "motion": motion}
+    sensors = {"tip": reads("upper", 1.5)}
+    found = studies.run(arm({"upper": LINK}, {"upper": {"joints": [MOVE]}}, sensor=sensors, carriage={"load": load}))
+    tip = found["tip"].where(found["elapsed"] >= stop - 1e-9)
+    assert found["tip_after_stop_max"] == pytest.approx(float(tip.max()), rel=1e-3)
+
+
+@pytest.mark.parametrize(
     ("joint", "on"),
     [(FREE, "upper"), ({"kind": "spherical"}, "lower"), (HINGE, "lower"), (HINGE | {"stiffness": 5.0}, "upper")],
     ids=["free", "spherical", "passive", "on a spring"],
