@@ -122,6 +122,8 @@ def _free_flyer(random: Random) -> tuple[Table, Columns]:
         "frame.hull.lateral_modes": int(random.integers(0, 4)),
         "body.hull.second_moment": _log(random, 8e-6, 8e-5),
         "question.duration": random.uniform(20.0, 60.0),
+        "carriage.payload.motion.times": [0.0, 10.0, 20.0],
+        "carriage.payload.motion.positions": [4.0, 16.0, 4.0],
     }
     columns = {
         "carriage.payload.mass": np.exp(random.uniform(np.log(4.0), np.log(160.0), SIZE)),
