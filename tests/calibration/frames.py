@@ -192,7 +192,10 @@ def judged(seed: int, tolerance: float, number: int) -> Judged:
     rows, statuses = [], []
     for steps in np.unique(found.steps):
         own = np.flatnonzero(found.steps == steps)
-        truth, told_as = _truth(scene, values.part(own), int(steps), longest, rung.modes), _labels(found.status[own])
+        truth, told_as = (
+            _truth(rung.of(scene), values.part(own), int(steps), longest, rung.modes),
+            _labels(found.status[own]),
+        )
         if truth is None:
             statuses += [(word, "too dear") for word in told_as]
             continue
