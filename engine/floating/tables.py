@@ -204,14 +204,18 @@ def _readings(model: FloatingModel) -> tuple[Array, Counts]:
 
 
 def _smooth(model: FloatingModel) -> Counts:
-    """Signals that go on as smoothly as coordinates do: what sensors read of these, also after stops, and places along
-    tracks of what slides by itself: given motions may stop at an instant, over which a parabola would pass."""
+    """(K, 2) signals that go on as smoothly as coordinates do: what sensors read of these, also after stops, and places
+    along tracks of what slides by itself: given motions may stop at an instant, over which a parabola would pass; and
+    whether it is their squares that do, as of lengths."""
     read = model.study.sensor.values()
     sensors = [n for n, sensor in enumerate(read) if not (sensor.reads.rate or sensor.reads.of_drive)]
     first = model.signal_of("carriages")
     places = [first + OF_CARRIAGE * c for c, name in enumerate(model.study.carriage) if name in model.places]
     stops = [model.signal_of("stops") + t for t in range(len(model.tips))]
-    return np.array([*sensors, *places, *stops], dtype=np.int64)
+    lengths = [sensor.reads.of_arm and sensor.direction is None for sensor in read]
+    at_stops = [sensor.direction is None for sensor in model.tips.values()]
+    squared = [*(lengths[n] for n in sensors), *(False for _ in places), *at_stops]
+    return np.array([[*sensors, *places, *stops], squared], dtype=np.int64).T.copy()
 
 
 def _depths(model: FloatingModel) -> Array:

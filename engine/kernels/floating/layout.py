@@ -47,6 +47,8 @@ PUSHED, TWISTED, GRIP_MODE = 0, 3, 6
 GRIP, IN_BODY, COURSE = 0, 1, 2
 # columns of System.shortening
 SHORTER, AXIS, ONE, OTHER = 0, 1, 2, 3
+# columns of System.smooth: the signal, and whether it is its square that is smooth
+SIGNAL, SQUARED = 0, 1
 # columns of System.tips: the sensor, and the body; of System.tip_places: the undeformed place in the frame, the
 # direction over the ground in which it is read, zero where the length is, and displacements by the modes, one after the
 # other
@@ -70,7 +72,7 @@ class System(NamedTuple):
     points (P, 3 + 3 n), pointed (P): places whose position over the ground is observed, and their bodies;
     point_shorter (P, A, n, n): G there.
     readings (S, N): of sensors, per coordinate; read_under (S, 3): the carriage under which one reads, or -1; the
-    component that it reads there; 0, 1 or 2 for coordinates, velocities or accelerations. smooth (K): signals that
+    component that it reads there; 0, 1 or 2 for coordinates, velocities or accelerations. smooth (K, 2): signals that
     have extremes between stations.
     tips (T, 2), tip_places (T, 6 + 3 n): places whose distance from the rigid arm is read; tip_shorter (T, A, n, n): G
     there; carrying (L): the bodies of these arms, each after its parent. bands (T, K), m: of each tip, within which it

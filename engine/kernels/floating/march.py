@@ -13,8 +13,6 @@ from engine.kernels.floating.layout import (
     DIVERGED,
     FIRST,
     KIND,
-    LARGEST,
-    LARGEST_AT,
     LENGTH,
     MASS,
     MODES,
@@ -23,17 +21,14 @@ from engine.kernels.floating.layout import (
     PLACE_COORDINATE,
     PLACE_MOTION,
     RIDDEN,
-    SMALLEST,
-    SMALLEST_AT,
     SOUND,
     SPHERICAL,
-    SQUARES,
     Coordinates,
     Lane,
 )
 from engine.kernels.floating.motions import motions_at
 from engine.kernels.floating.newton import bound_masses, factor_masses, raise_beta, settle, solve_accelerations, step
-from engine.kernels.floating.observe import apart, observe, observe_whole, of_way
+from engine.kernels.floating.observe import apart, count, count_between, observe, observe_whole, of_way
 from engine.kernels.floating.state import (
     CODE,
     EVENT,
@@ -317,44 +312,6 @@ def check(system, y, motions, memory):
         for k in range(system.tree[b, FIRST], system.tree[b, FIRST] + system.tree[b, MODES]):
             bent = choose(size_of(lanes_at(y, (k,))) <= most, 0.0, 1.0)  # NaN too
             put_where(sound(memory) & (bent > 0.5), memory, (CODE,), all_lanes(1.0 * DIVERGED))
-
-
-@called
-def count(who, signals, watched, number, weight, statistics, block):
-    """The first signals of a station go into the statistics of some lanes."""
-    at = all_lanes(float(number))
-    for j in range(watched):
-        value = lanes_at(signals, (j,))
-        larger = who & (value > lanes_at(statistics, (block, j, LARGEST)))
-        put_where(larger, statistics, (block, j, LARGEST), value)
-        put_where(larger, statistics, (block, j, LARGEST_AT), at)
-        smaller = who & (value < lanes_at(statistics, (block, j, SMALLEST)))
-        put_where(smaller, statistics, (block, j, SMALLEST), value)
-        put_where(smaller, statistics, (block, j, SMALLEST_AT), at)
-        squares = lanes_at(statistics, (block, j, SQUARES))
-        put_where(who, statistics, (block, j, SQUARES), squares + weight * value * value)
-
-
-@called
-def count_between(who, smooth, signals, past, number, statistics, block):
-    """Extremes of smooth signals between stations: the vertices of parabolas through three, near the middle one."""
-    for k in range(smooth.shape[0]):
-        j = smooth[k]
-        one, two, three = lanes_at(past, (0, k)), lanes_at(past, (1, k)), lanes_at(signals, (j,))
-        put_lanes(past, (0, k), two)
-        put_lanes(past, (1, k), three)
-        if number < 2:
-            continue
-        slope, bend = 0.5 * (three - one), one - 2.0 * two + three
-        turns = who & (bend * bend > 0.0) & (4.0 * slope * slope <= bend * bend)
-        after_it = -1.0 * slope / choose(turns, bend, 1.0)
-        value, at = two + 0.5 * slope * after_it, after_it + (number - 1.0)
-        larger = turns & (bend < 0.0) & (value > lanes_at(statistics, (block, j, LARGEST)))
-        put_where(larger, statistics, (block, j, LARGEST), value)
-        put_where(larger, statistics, (block, j, LARGEST_AT), at)
-        smaller = turns & (bend > 0.0) & (value < lanes_at(statistics, (block, j, SMALLEST)))
-        put_where(smaller, statistics, (block, j, SMALLEST), value)
-        put_where(smaller, statistics, (block, j, SMALLEST_AT), at)
 
 
 @called

@@ -10,6 +10,8 @@ from engine.kernels.floating.layout import (
     COORDINATE,
     FIRST,
     HEIGHT,
+    LARGEST,
+    LARGEST_AT,
     MASS,
     MODES,
     MOMENT,
@@ -19,9 +21,14 @@ from engine.kernels.floating.layout import (
     RIDDEN,
     SECOND_ORDER,
     SHORTENED,
+    SIGNAL,
+    SMALLEST,
+    SMALLEST_AT,
     SPRING,
     SPRUNG_COORDINATE,
     SPRUNG_MASS,
+    SQUARED,
+    SQUARES,
     STIFFNESS,
     TIP_BODY,
     TIP_PLACE,
@@ -31,6 +38,7 @@ from engine.kernels.floating.layout import (
     TRANSLATION,
 )
 from engine.kernels.floating.loads import between
+from engine.kernels.floating.state import put_where
 from engine.kernels.floating.tracks import (
     SHAPE,
     SLOPE,
@@ -303,3 +311,52 @@ def of_mass(lane, b, mass, moving, work, out, first):
     r, p = over_ground(work.frames, b, d), times(mass, velocity)
     energies = (0.5 * mass * dot(velocity, velocity), -1.0 * falling(lane, times(mass, r)))
     include(out, first, energies, p, cross(r, p))
+
+
+@called
+def count(who, signals, watched, number, weight, statistics, block):
+    """The first signals of a station go into the statistics of some lanes."""
+    at = all_lanes(float(number))
+    for j in range(watched):
+        value = lanes_at(signals, (j,))
+        larger = who & (value > lanes_at(statistics, (block, j, LARGEST)))
+        put_where(larger, statistics, (block, j, LARGEST), value)
+        put_where(larger, statistics, (block, j, LARGEST_AT), at)
+        smaller = who & (value < lanes_at(statistics, (block, j, SMALLEST)))
+        put_where(smaller, statistics, (block, j, SMALLEST), value)
+        put_where(smaller, statistics, (block, j, SMALLEST_AT), at)
+        squares = lanes_at(statistics, (block, j, SQUARES))
+        put_where(who, statistics, (block, j, SQUARES), squares + weight * value * value)
+
+
+@called
+def count_between(who, smooth, signals, past, number, statistics, block):
+    """Extremes of smooth signals between stations: the vertices of parabolas through three, near the middle one; the
+    smallest of lengths by their squares, which are smooth where they pass near 0."""
+    for k in range(smooth.shape[0]):
+        j = smooth[k, SIGNAL]
+        one, two, three = lanes_at(past, (0, k)), lanes_at(past, (1, k)), lanes_at(signals, (j,))
+        put_lanes(past, (0, k), two)
+        put_lanes(past, (1, k), three)
+        if number < 2:
+            continue
+        turns, bend, value, at = vertex(one, two, three)
+        larger = who & turns & (bend < 0.0) & (value > lanes_at(statistics, (block, j, LARGEST)))
+        put_where(larger, statistics, (block, j, LARGEST), value)
+        put_where(larger, statistics, (block, j, LARGEST_AT), at + (number - 1.0))
+        if smooth[k, SQUARED]:
+            turns, bend, value, at = vertex(one * one, two * two, three * three)
+            value = root(choose(value > 0.0, value, 0.0))
+        smaller = who & turns & (bend > 0.0) & (value < lanes_at(statistics, (block, j, SMALLEST)))
+        put_where(smaller, statistics, (block, j, SMALLEST), value)
+        put_where(smaller, statistics, (block, j, SMALLEST_AT), at + (number - 1.0))
+
+
+@called
+def vertex(one, two, three):
+    """Whether a parabola through three stations turns near the middle one, its bend, its value there, and how many steps
+    that is behind the middle."""
+    slope, bend = 0.5 * (three - one), one - 2.0 * two + three
+    turns = (bend * bend > 0.0) & (4.0 * slope * slope <= bend * bend)
+    at = -1.0 * slope / choose(turns, bend, 1.0)
+    return turns, bend, two + 0.5 * slope * at, at
