@@ -354,8 +354,8 @@ def count_between(who, smooth, signals, past, number, statistics, block):
 
 @called
 def vertex(one, two, three):
-    """Whether a parabola through three stations turns near the middle one, its bend, its value there, and how many steps
-    that is behind the middle."""
+    """Whether a parabola through three stations turns near the middle one, its bend, its value where it does, and how
+    many steps that is behind the middle."""
     slope, bend = 0.5 * (three - one), one - 2.0 * two + three
     turns = (bend * bend > 0.0) & (4.0 * slope * slope <= bend * bend)
     at = -1.0 * slope / choose(turns, bend, 1.0)
