@@ -21,6 +21,7 @@ from results_schema.arrays import Array
 if TYPE_CHECKING:
     from engine.floating.model import FloatingModel, OneJoint
 
+LIGHT = 1e-6  # of the masses of carriages, of which a mass matrix without them is left that can be solved
 #: Keys of numbers that a variant may have to itself within one scene.
 OWN_KEYS = re.compile(
     r"gravity|solver\.tolerance|body\.\w+\.damping_ratio(\..+)?"
@@ -61,7 +62,15 @@ def lanes(model: FloatingModel, values: VariantValues, step: Array) -> Lane:
     motions = _motions(model, numbers)
     loads, links = _loads(model, numbers), _links(model, numbers)
     events, damping, stops = _events(motions), _damping(model, values), _stops(model, motions)
-    return Lane(gravity, damping, joints, carriages, motions, events, start, loads, links, stops, step[:, None])
+    riding = carriages, _light(carriages)
+    return Lane(gravity, damping, joints, *riding, motions, events, start, loads, links, stops, step[:, None])
+
+
+def _light(carriages: Array) -> Array:
+    """(V, C, CARRIAGE) carriages of next to no mass."""
+    found = carriages.copy()
+    found[..., [columns.OWN_MASS, *range(columns.INERTIA, columns.INERTIA + 3), columns.SPRUNG_MASS]] *= LIGHT
+    return found
 
 
 def in_blocks(table: Array) -> Array:

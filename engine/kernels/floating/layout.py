@@ -130,17 +130,19 @@ class Coordinates(NamedTuple):
 class Lane(NamedTuple):
     """Numbers of variants: their axis is the first one, L; in blocks it is the first and, in each, the last.
 
-    gravity (3) m/s2, of the ground. damping (B n): 2 zeta omega. joints (J, 2): stiffness and damping about 0 or about
-    the given motion. carriages (C, CARRIAGE). motions (M, pieces, PIECE). events (E): ascending times (s) at which a
-    motion goes on as another piece, infinite from the last on. start (2, N): coordinates and velocities. loads (Q, 6):
-    forces and torques. links (K, 3): stiffness, damping, free length. stops (T): times (s) at which the joints that
-    carry a tip have come to their ends, infinite where they never do. step: s.
+    gravity (3) m/s2, of the ground. damping (B n): 2 zeta omega. joints (J, 2): stiffness and damping about 0 or
+    about the given motion. carriages, light (C, CARRIAGE): as they are, and of next to no mass. motions (M,
+    pieces, PIECE). events (E): ascending times (s) at which a motion goes on as another piece, infinite from
+    the last on. start (2, N): coordinates and velocities. loads (Q, 6): forces and torques. links (K, 3):
+    stiffness, damping, free length. stops (T): times (s) at which the joints that carry a tip have come to
+    their ends, infinite where they never do. step: s.
     """
 
     gravity: FloatArray
     damping: FloatArray
     joints: FloatArray
     carriages: FloatArray
+    light: FloatArray
     motions: FloatArray
     events: FloatArray
     start: FloatArray

@@ -55,7 +55,7 @@ from engine.kernels.vector import all_lanes, choose, everywhere, lanes_at, put_l
 #: for each step, which saves one correction in four of a mass that slides.
 KEPT = 8
 MOST_BENT = 10.0  # lengths of a body: beyond, a march has diverged, whatever is wrong
-LOOKED = 8  # times of the march, besides its start, at which masses are looked at for what a step needs
+LOOKED = 9  # times of the march at which masses are looked at for what a step needs
 UNBOUNDED = 1e300  # kg, or alike
 NEAR = 1e-9  # of a step: an event so near to a station falls on it
 JUMP = 1e-12  # of a rate: below it is rounding
@@ -250,13 +250,32 @@ def start(system, lane, scheme, end, state, solver, left):
         put_lanes(state.beta, (k,), all_lanes(UNBOUNDED if scheme.raised else scheme.beta))
     for back in range(LOOKED if scheme.raised else 0, -1, -1):
         put_lanes(memory, (SCALE,), all_lanes(0.0))
-        time = end * (back / LOOKED)
+        time = end * (max(back - 1, 0) / (LOOKED - 1))
         motions_at(lane.motions, time, time, work.piece, work.motions)
-        solve_accelerations(system, lane, everyone, state, solver)
-        if scheme.raised:
+        solve_accelerations(system, with_light_carriages(lane) if back else lane, everyone, state, solver)
+        if back:
             bound_masses(system, lane, state, solver)
     if scheme.raised:
-        raise_beta(scheme, lanes_at(lane.step, (0,)), state, solver.other)
+        raise_beta(system, lane, scheme, state, solver.other)
+
+
+@called
+def with_light_carriages(lane):
+    """The lane as if next to nothing rode along: wherever carriages are, they only add to that mass matrix."""
+    return Lane(
+        lane.gravity,
+        lane.damping,
+        lane.joints,
+        lane.light,
+        lane.light,
+        lane.motions,
+        lane.events,
+        lane.start,
+        lane.loads,
+        lane.links,
+        lane.stops,
+        lane.step,
+    )
 
 
 @called
@@ -343,6 +362,7 @@ def march(system, lanes, scheme, steps, record):
             lanes.damping[block],
             lanes.joints[block],
             lanes.carriages[block],
+            lanes.light[block],
             lanes.motions[block],
             lanes.events[block],
             lanes.start[block],

@@ -21,6 +21,7 @@ from engine.kernels.floating.layout import (
     SPHERICAL,
     SPRING,
     SPRUNG_COORDINATE,
+    SPRUNG_MASS,
     STIFFNESS,
 )
 from engine.kernels.floating.state import (
@@ -54,6 +55,7 @@ STALLED = 0.5  # a small correction that is no smaller than so much of the one b
 SLOW = 0.1  # a correction over the one before it, from which on the tangent of a lane is made anew
 MOST_ITERATIONS = 25
 SHARE = 0.5  # of the bounds of masses that steps may take: coordinates that move change the mass matrix
+OF_SPRUNG = 0.1  # of a mass on a spring
 POWERS, GOLDEN = 16, 0.618  # steps of the power method, from a vector that is along no mode
 STILL = 1e-9  # of a length within a step: what moves by less rests
 #: Of statics, whose coordinates are counted in lengths of their body, rad or m: by how much they are moved for
@@ -205,12 +207,19 @@ def largest_eigenvalue(P, x, y):
 
 
 @called
-def raise_beta(scheme, h, state, stiffness):
-    """Newmark's beta of each coordinate of a stiffness (N, LANES), from the bounds of its masses.
+def raise_beta(system, lane, scheme, state, stiffness):
+    """Newmark's beta of each coordinate from the bounds of its masses; stiffness (N, LANES): room.
 
     Where stiffness K couples no coordinates, y = h^2 (1/delta + beta) a, by central differences delta of a step, makes
     s^2 (M + h^2 K (beta - 1/4)) + s C + K = 0 of M a + C v + K y = 0, with s = 2/h (z - 1)/(z + 1): it is stable while
-    M > diag(h^2 K (1/4 - beta)), whatever C >= 0 damps."""
+    M > diag(h^2 K (1/4 - beta)), whatever C >= 0 damps. The mass on a carriage's spring counts by a part, as little of
+    it is felt where many modes give way under the carriage."""
+    h = lanes_at(lane.step, (0,))
+    own_stiffness(system, lane, stiffness)
+    for c in range(system.riders.shape[0]):
+        if system.riders[c, SPRUNG_COORDINATE] >= 0:
+            mass = lanes_at(lane.carriages, (c, SPRUNG_MASS))
+            put_lanes(state.beta, (system.riders[c, SPRUNG_COORDINATE],), OF_SPRUNG * mass)
     for k in range(state.beta.shape[0]):
         square, bound = h * h * lanes_at(stiffness, (k,)), SHARE * lanes_at(state.beta, (k,))
         fast = square * (0.25 - scheme.beta) > bound
