@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from engine.kernels.floating.layout import Weights
-from engine.kernels.schemes import AlphaScheme, NewmarkScheme
+from engine.kernels.schemes import SCHEMES, AlphaScheme, NewmarkScheme
 
 if TYPE_CHECKING:
     from engine.scene.study import Study
 
 #: Where the study names none: Fox-Goodwin, whose phase is of fourth order, with a larger beta of each coordinate that
 #: is too fast for it.
-USUAL = NewmarkScheme("fox-goodwin", 1.0 / 12.0, 0.5)
+USUAL = cast(NewmarkScheme, SCHEMES["fox-goodwin"]({}))
 
 
 def scheme_of(study: Study) -> NewmarkScheme | AlphaScheme:

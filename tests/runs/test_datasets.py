@@ -165,5 +165,8 @@ def test_a_misspelt_name_in_a_dotted_key_gets_a_hint() -> None:
     assert "one that there is: table" in refused(given.with_values, {"carriage.z.motion.speed": 3.0})
     said = refused(given.with_values, {"carriage.table.motion.speed": [3.0, 4.0]})
     assert 'to vary it: [sweep] NAME = { of = "carriage.table.motion.speed", values = [3.0, 4.0] }' in said
+    limited = type(given)(**(given.data | {"question": {"displacement": [5e-3]}}))
+    said = refused(studies.run, limited)  # what is told of results is not swept
+    assert "question.displacement: wrong type" in said and "to vary it" not in said
     second = {"on": "bed", "mass": 1.0, "motion": {"kind": "cruise", "start": 0.0, "end": 1.0, "speed": 1.0}}
     assert "did you mean" not in refused(given.with_values, {"carriage.table_2": second})
