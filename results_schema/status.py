@@ -89,6 +89,7 @@ class SchemeUsed(IntEnum):
     GENERALIZED_ALPHA = 6
     RICHARDSON = 7
     OTHER = 8  # of another package
+    SCALED_FOX_GOODWIN = 9
 
 
 def flag_values(flags: type[IntEnum]) -> list[int]:

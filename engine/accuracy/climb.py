@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,6 @@ from engine.accuracy.grids import SceneGrid
 from engine.accuracy.jobs import InTurn, Job, Share
 from engine.accuracy.ladder import ENOUGH, Ladder, March, Rungs
 from engine.accuracy.reference import Converged, Level, Marches, as_fixed, converge, in_full, is_free, left_by_elements
-from engine.kernels.schemes import Scheme
 from engine.march.outcome import vibration
 from engine.model.numerics import open_bodies
 from engine.scene.variants import VariantValues
@@ -29,14 +29,6 @@ from results_schema.arrays import Array, Counts
 HOPELESS = 0.9
 MORE = 2.0  # times the fewest modes that leave little: with 1.4 some variants missed the tolerance, 4 gained nothing
 JUDGED_BY = 12  # modes, at least, of the column that says whether a simpler model can do at all: 6 to 24 took 0.8 to 1
-#: Of the tolerance, by a rung of the last scheme, for all pilots of a scene: dearer ones of other schemes are not
-#: climbed, as none would be taken. Of a gantry's pilots they took three quarters of the time.
-LEAVES = 0.5
-#: Times the steps of a rung, within which a level of a pilot's reference tells enough of it, and fewer pilots than make
-#: its march worth it, which takes as long as that of a whole block of lanes. Ten random sweeps took 0.81 times the time
-#: then, and 0.83 to 1.03 times the own work; as long with 16, at 0.80 to 1.06; whatever their number, two took 1.7 and
-#: 2.3 times the own work.
-NEAR, FEW = 2.0, 8
 REFERENCE_PART = 0.25  # of the tolerance by which references may be off, which what they judge is told to be off too
 
 
@@ -97,9 +89,8 @@ class Climb:
         self.marched = np.zeros(shape[:2], dtype=np.bool_)
         for name in dict.fromkeys(numerics.fidelity for numerics in self.ladder.columns):
             self._judge(name)
-        for climbs in (self._to_higher_order, self._of_higher_order, self._further):
-            for marches in self.share(self.rungs, list(climbs())):
-                self._take(marches)
+        for marches in self.share(self.rungs, list(self._climbs())):
+            self._take(marches)
         for name, enough in self.enough.items():
             self._fill(name, enough)
         return self._measured(truth, aim is truth, left_by_elements(full, truth, self.share))
@@ -109,8 +100,7 @@ class Climb:
         of every pilot."""
         columns = {numerics: column for column, numerics in enumerate(self.ladder.columns)}
         if open_bodies(self.grid.scene.study):
-            last = self.ladder.columns[-1].scheme
-            return {columns[v.numerics]: v for v in levels if v.numerics in columns and v.numerics.scheme == last}
+            return {columns[v.numerics]: v for v in levels if v.numerics in columns}
         fixed = levels[0].numerics
         by = np.asarray(aim.used["steps_used"] // (self.grid.unit * fixed.scheme.stride), dtype=np.int64)
         return {columns[fixed]: Level(fixed, np.arange(by.size), by, aim.outcome)} if fixed in columns else {}
@@ -130,8 +120,8 @@ class Climb:
         return vibration(tables, self.values, self.grid.stations(self.grid.scene, 1), truth.outcome)
 
     def _judge(self, name: str) -> None:
-        """What each number of modes of a model leaves, by the last scheme alone; from the fewest on, until some leave
-        so little that many more are of no use."""
+        """What each number of modes of a model leaves; from the fewest on, until some leave so little that many more
+        are of no use."""
         own = [column for column, numerics in enumerate(self.ladder.columns) if numerics.fidelity == name]
         everywhere = np.ones(self.values.size, dtype=np.bool_)
         if name == "static" or len(self.ladder.cuts) == 1:
@@ -139,31 +129,28 @@ class Climb:
                 fits = self.rungs.least(column)[0] <= 1.0 if name != "static" else everywhere
                 self._march(column, {0: np.flatnonzero(fits)})
             return
-        families: dict[int, list[int]] = {}
-        for column in own:
-            families.setdefault(self.ladder.columns[column].modes, []).append(column)
         if not open_bodies(self.grid.scene.study):
-            self.floor |= dict.fromkeys(own, self._as_fixed(name, own))
+            [column] = own
+            self.floor[column] = self._as_fixed(name, column)
             return
+        of_count = {self.ladder.columns[column].modes: column for column in own}
         if name != self.grid.scene.numerics.fidelity:
-            modes = next((count for count in families if count >= JUDGED_BY), max(families))
-            everywhere = self._floor(families[modes][-1], everywhere) <= HOPELESS * self.span[1]
+            modes = next((count for count in of_count if count >= JUDGED_BY), max(of_count))
+            everywhere = self._floor(of_count[modes], everywhere) <= HOPELESS * self.span[1]
         enough = np.full(self.values.size, np.inf)
-        for count, columns in families.items():
-            floor = self._floor(columns[-1], everywhere & (count <= MORE * enough))
-            enough = np.where((floor <= ENOUGH * self.span[0]) & ~np.isfinite(enough), count, enough)
-            self.floor |= dict.fromkeys(columns, floor)
+        for count, column in of_count.items():
+            self.floor[column] = self._floor(column, everywhere & (count <= MORE * enough))
+            holds = self.floor[column] <= ENOUGH * self.span[0]
+            enough = np.where(holds & ~np.isfinite(enough), count, enough)
         self.enough[name] = enough
 
-    def _as_fixed(self, name: str, columns: list[int]) -> Array:
-        """(P,) what modes that a study fixes leave of what is wanted of them: nothing, and a simpler model by the last
-        scheme, or by the first where the highest of the modes would ask that for more work than the reference."""
+    def _as_fixed(self, name: str, column: int) -> Array:
+        """(P,) what modes that a study fixes leave of what is wanted of them: nothing, or what a simpler model does."""
         if name == self.grid.scene.numerics.fidelity:
-            for column in self.rungs.levels:
-                self._take(self.rungs.marched(np.flatnonzero(self.rungs.known(column)), column))
+            for level in self.rungs.levels:
+                self._take(self.rungs.marched(np.flatnonzero(self.rungs.known(level)), level))
             return np.zeros(self.values.size)
-        floor = self._floor(columns[-1], np.ones(self.values.size, dtype=np.bool_))
-        return np.minimum(floor, self._floor(columns[0], ~np.isfinite(floor)))
+        return self._floor(column, np.ones(self.values.size, dtype=np.bool_))
 
     def _floor(self, column: int, fits: NDArray[np.bool_]) -> Array:
         """(P,) what a column leaves with so many steps that its modes and its model alone do; infinite where these
@@ -183,66 +170,13 @@ class Climb:
         found[lanes] = self.held[column, fine[lanes], lanes]
         return found
 
-    def _pairs(self) -> dict[int, int]:
-        """Columns of a scheme beside which there is one of higher order, and that column."""
-        last = self.ladder.columns[-1].scheme
-        swift = {numerics: column for column, numerics in enumerate(self.ladder.columns) if numerics.scheme == last}
-        others = (column for column in self.floor if column not in swift.values())
-        return {column: swift[self.ladder.columns[column]._replace(scheme=last)] for column in others}
-
-    def _to_higher_order(self) -> Iterator[Job[list[March]]]:
-        """Climbs as far as where a scheme of higher order begins."""
-        for column, swift in self._pairs().items():
-            begins = self.rungs.work(swift)[np.minimum(self.rungs.first(swift), len(self.ladder.cuts) - 1)]
-            yield from self._climb(column, self.rungs.first(column), np.minimum(begins, self._least_work(column)))
-
-    def _of_higher_order(self) -> Iterator[Job[list[March]]]:
-        """Climbs by that, where the other one does not hold well before; where it does, that is no worse."""
-        plain = {swift: column for column, swift in self._pairs().items()}
-        for column in (column for column in self.floor if column not in plain.values()):
+    def _climbs(self) -> Iterator[Job[list[March]]]:
+        """Of all columns, for pilots whose tolerance they can hold at all."""
+        for column, floor in self.floor.items():
             start = self.rungs.first(column)
-            if column in plain:
-                well = self.held[plain[column]] <= ENOUGH * self.span[0]
-                before = well.any(axis=0) & (np.argmax(well, axis=0) <= start)
-                self._no_worse(column, plain[column], np.flatnonzero(before))
-                start = np.where(before, len(self.ladder.cuts), start)
-            start = np.where(self._near_its_level(column, start), len(self.ladder.cuts), start)
-            yield from self._climb(column, start, np.full(start.size, np.inf))
-
-    def _near_its_level(self, column: int, start: Counts) -> NDArray[np.bool_]:
-        """(P,) whether a rung is near to a level of the reference, and too few pilots would march it."""
-        if column not in self.rungs.levels:
-            return np.zeros(start.size, dtype=np.bool_)
-        cuts, worth = np.array([*self.ladder.cuts, np.inf]), self.floor[column] <= HOPELESS * self.span[1]
-        near = self.rungs.known(column) & (cuts[self.rungs.fine(column)] < NEAR * cuts[start])
-        marching = np.bincount(start[worth], minlength=cuts.size)
-        return np.asarray(near & (marching[start] < FEW))
-
-    def _further(self) -> Iterator[Job[list[March]]]:
-        """The first climbs from where they ended, as far as a scheme of higher order does not hold well for all pilots
-        with less work."""
-        for column in self._pairs():
-            told = self.march[column] > 0
-            start = len(told) - np.where(told.any(axis=0), np.argmax(told[::-1], axis=0), 0)
-            yield from self._climb(column, start, np.full(start.size, self._least_work(column)))
-
-    def _climb(self, column: int, start: Counts, most: Array) -> Iterator[Job[list[March]]]:
-        """Of a column, for pilots whose tolerance it can hold at all and to whom it is not dear from the start."""
-        floor, rungs = self.floor[column], np.minimum(start, len(self.ladder.cuts) - 1)
-        worth = (floor <= HOPELESS * self.span[1]) & (start < len(self.ladder.cuts))
-        lanes = np.flatnonzero(worth & (self.rungs.work(column)[rungs] <= most))
-        if lanes.size:
-            yield Job(partial(Rungs.climb, column=column, start=start, floor=floor, most=most), lanes)
-
-    def _least_work(self, column: int) -> float:
-        """Modes x steps of the cheapest marched rung of the same model by other schemes that holds well for all pilots;
-        infinite where none does."""
-        least, own = np.inf, self.ladder.columns[column]
-        for other, numerics in enumerate(self.ladder.columns):
-            if numerics.fidelity == own.fidelity and numerics.scheme != own.scheme:
-                holds = np.all(self.held[other] <= LEAVES * self.span[0], axis=1)
-                least = min(least, float(self.rungs.work(other)[holds].min(initial=np.inf)))
-        return least
+            worth = (floor <= HOPELESS * self.span[1]) & (start < len(self.ladder.cuts))
+            if worth.any():
+                yield Job(partial(Rungs.climb, column=column, start=start, floor=floor), np.flatnonzero(worth))
 
     def _march(self, column: int, pilots: Mapping[int, Counts]) -> None:
         """March some pilots on each of some rungs."""
@@ -251,29 +185,21 @@ class Climb:
 
     def _take(self, marches: Iterable[March]) -> None:
         """What marches found; of a column's, finer rungs are no worse."""
-        for column, rung, lanes, error, held, finer, work in marches:
+        for column, rung, lanes, error, held, work in marches:
             numbers = sum(pilot.size for pilot, _ in self.found) + np.arange(lanes.size)
             self.marched[column, rung] = True
             self.held[column, rung:, lanes] = held[:, None]
-            self.march[column, rung:, lanes] = np.where(finer, numbers, 0)[:, None]
-            self.march[column, rung, lanes] = numbers
+            self.march[column, rung:, lanes] = numbers[:, None]
             self.found.append((lanes, error.T))
             self.work += work
 
     def _fill(self, name: str, enough: Array) -> None:
         """Pilots for which fewer modes were enough are no worse with more and the same steps, within their rules."""
-        before: dict[Scheme, int] = {}
-        for column, numerics in enumerate(self.ladder.columns):
-            if numerics.fidelity != name:
-                continue
-            lanes = np.flatnonzero((numerics.modes > enough) & ~np.isfinite(self.held[column]).any(axis=0))
-            if numerics.scheme in before:
-                self._no_worse(column, before[numerics.scheme], lanes)
-            before[numerics.scheme] = column
-
-    def _no_worse(self, column: int, other: int, lanes: Counts) -> None:
-        """Unknown rungs of a column that some pilots may take are no worse than those of another with as many steps."""
-        allowed = np.array(self.ladder.cuts)[:, None] >= self.rungs.least(column)[0][lanes]
-        rungs, own = np.nonzero(allowed & ~np.isfinite(self.held[column][:, lanes]))
-        for told in (self.held, self.march):
-            told[column, rungs, lanes[own]] = told[other, rungs, lanes[own]]
+        own = [column for column, numerics in enumerate(self.ladder.columns) if numerics.fidelity == name]
+        for fewer, column in pairwise(own):
+            is_more = self.ladder.columns[column].modes > enough
+            lanes = np.flatnonzero(is_more & ~np.isfinite(self.held[column]).any(axis=0))
+            allowed = np.array(self.ladder.cuts)[:, None] >= self.rungs.least(column)[0][lanes]
+            rungs, pilots = np.nonzero(allowed & ~np.isfinite(self.held[column][:, lanes]))
+            for told in (self.held, self.march):
+                told[column, rungs, lanes[pilots]] = told[fewer, rungs, lanes[pilots]]

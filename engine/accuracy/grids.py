@@ -10,7 +10,7 @@ import numpy as np
 
 from engine.kernels.schemes import SCHEMES
 from engine.march.envelopes import envelope_tables
-from engine.march.step_rules import LIMIT_MARGIN, are_soft, free_steps, least_steps, vibrates_freely
+from engine.march.step_rules import are_soft, free_limit, free_steps, least_steps, limit_with_springs, vibrates_freely
 from engine.march.tables import SceneTables
 from engine.model.numerics import open_bodies
 from engine.model.scene_model import with_numerics
@@ -21,6 +21,7 @@ from engine.statics.static_response import Statics
 from results_schema.arrays import Counts
 
 if TYPE_CHECKING:
+    from engine.kernels.schemes import Scheme
     from engine.march.outcome import Asked
     from engine.model.numerics import Numerics
     from engine.model.scene_model import SceneModel
@@ -36,6 +37,7 @@ FEWER, LEAST_LEVELS = (2, 1), 3  # the same where 64 modes hold few of them, and
 PILOT_PLACES = 9  # of an envelope, at which its error is measured: a mode or two lie between them at 1e-3
 MOST_COMPARED = 4096  # stations of the histories that are compared: 0.25 MB of 8 variants each signal
 KEPT_CYCLE = 256 * 2**20  # of a cycle's tables: ten of 64 modes x 102,400 steps took 2.1 s, 3.1 s with 96 MB
+CLOSE_STEPS = 320  # per first period, with which average acceleration is 5e-5 off in phase
 LEAST_FREE = 8  # steps per first period of free vibration: what the coarsest march of such passages had
 
 
@@ -136,8 +138,7 @@ class SceneGrid:
 
     def free_by(self, model: SceneModel, by: int) -> int:
         """Steps of a march in one of the grid's free vibration, within its scheme's limit."""
-        least = 2.0 * np.pi * LIMIT_MARGIN * float(model.omega.max()) / model.first_omega / model.scheme.stability_limit
-        return by * max(1, int(np.ceil(least / (self._free_unit * by))))
+        return by * max(1, int(np.ceil(free_limit(model) / (self._free_unit * by))))
 
     def once(self, model: SceneModel, by: int) -> SceneTables:
         """The same for one march alone."""
@@ -190,13 +191,17 @@ def unit_steps(scene: SceneModel) -> int:
     return PASSAGE_STEPS if scene.clock.period is None else CYCLE_STEPS
 
 
-def swift_scheme_fits(grid: SceneGrid) -> bool:
-    """Whether Fox-Goodwin may march a scene: free vibration with springs that are not soft beside any of its modes
-    wants a scheme without a limit."""
-    if not any(vibrates_freely(carriage) for carriage in grid.scene.carriages):
-        return True
+def open_scheme(grid: SceneGrid) -> Scheme:
+    """The scheme of a study that leaves it open: Fox-Goodwin's, whose fast modes take mass; average acceleration, which
+    has no limit, where springs are stiff: beside modes in free vibration, or so that their limit asks for more steps
+    than average acceleration takes to be close."""
     fewest = grid.mode_levels[0] if open_bodies(grid.scene.study) else 0
-    return are_soft(grid.model(grid.scene.numerics._replace(modes=fewest)), grid.values)
+    model = grid.model(grid.scene.numerics._replace(scheme=SWIFT, modes=fewest))
+    if any(vibrates_freely(carriage) for carriage in model.carriages) and not are_soft(model, grid.values):
+        return AVERAGE_ACCELERATION
+    close = CLOSE_STEPS * grid.values.scene_time_scale * model.first_omega / (2.0 * np.pi)
+    is_stiff = bool(model.springs) and np.any(limit_with_springs(model, grid.values) > close)
+    return AVERAGE_ACCELERATION if is_stiff else SWIFT
 
 
-AVERAGE_ACCELERATION, FOX_GOODWIN = (SCHEMES[name]({}) for name in ("average-acceleration", "fox-goodwin"))
+AVERAGE_ACCELERATION, SWIFT = (SCHEMES[name]({}) for name in ("average-acceleration", "scaled-fox-goodwin"))

@@ -1,6 +1,6 @@
 """The ladder of what a variant may be computed with, and its rungs, marched for some variants (pilots).
 
-A column of the ladder is a model, a number of modes and a scheme; its rungs are numbers of steps.
+A column of the ladder is a model and a number of modes; its rungs are numbers of steps.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.accuracy.grids import AVERAGE_ACCELERATION, FOX_GOODWIN, SceneGrid, swift_scheme_fits
+from engine.accuracy.grids import AVERAGE_ACCELERATION, SceneGrid, open_scheme
 from engine.accuracy.jobs import Halted
 from engine.accuracy.results import deciding, differences, results_of, worst_held
 from engine.march.outcome import Asked, Outcome, outcome
@@ -25,13 +25,14 @@ from results_schema.status import Fidelity
 
 if TYPE_CHECKING:
     from engine.accuracy.reference import Converged, Level
+    from engine.kernels.schemes import Scheme
 
 MODES = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)  # each a third to a half more than the one before
 SIMPLER = (("static", Fidelity.STATIC), ("force", Fidelity.FORCE), ("mass", Fidelity.MASS))  # than the carriages' own
 CUTS = tuple(sorted({2**k for k in range(16)} | {3 * 2**k for k in range(15)}))  # steps in one of the grid's
 #: Steps at which a column's modes are judged, per first period and in one of the grid's: by Fox-Goodwin (1e-8 of phase
 #: a period), and by schemes of second order (1e-5). With half of them `double-peak` took 1.7 times the work.
-FINE = {"fox-goodwin": (128.0, 16.0), "": (512.0, 32.0)}
+FINE = {**dict.fromkeys(("fox-goodwin", "scaled-fox-goodwin"), (128.0, 16.0)), "": (512.0, 32.0)}
 # What is said of the next three was measured on `asymmetry`, `double-peak` and 10,000 passages: the work they took.
 FIRST = 3.0  # steps per first period, with which pilots begin: no rung of fewer has held 1e-2; 1 to 6 chose alike
 FLAT = 1.2  # times what a column leaves, from where finer rungs gain nothing: 1.05 to 1.5 chose alike
@@ -46,22 +47,19 @@ class Ladder:
     cuts: tuple[int, ...]
 
 
-def ladder_of(asked: Asked, grid: SceneGrid) -> Ladder:
-    """The ladder within what the study fixes."""
+def ladder_of(asked: Asked, grid: SceneGrid, scheme: Scheme | None = None) -> Ladder:
+    """The ladder within what the study fixes, by the scheme that all scenes of a sweep have where there are several."""
     if grid.common is not None:
         return Ladder(grid.common, (1,) if grid.fixed else CUTS)
     study, says = asked.study, grid.scene.numerics
     names = open_bodies(grid.scene.study)
     rigid = max((part.modal.rigid_modes for part in grid.scene.bodies if part.name in names), default=0)
     modes = [count for count in MODES if count > rigid] if names else [0]
-    schemes = [says.scheme]
-    if study.solver.scheme == "auto" and not grid.fixed:
-        schemes = [AVERAGE_ACCELERATION, FOX_GOODWIN] if swift_scheme_fits(grid) else [AVERAGE_ACCELERATION]
+    is_open = study.solver.scheme == "auto" and not grid.fixed
     columns = [
-        says._replace(fidelity=name, scheme=scheme, modes=count)
+        says._replace(fidelity=name, scheme=(scheme or open_scheme(grid)) if is_open else says.scheme, modes=count)
         for name in _models(asked, grid)
         for count in (modes[:1] if name == "static" and says.static_correction else modes)
-        for scheme in (schemes[:1] if name == "static" else schemes)
     ]
     return Ladder(tuple(columns), (1,) if grid.fixed else CUTS)
 
@@ -69,7 +67,9 @@ def ladder_of(asked: Asked, grid: SceneGrid) -> Ladder:
 def share_ladder(asked: Asked, grids: Sequence[SceneGrid]) -> None:
     """Let the scenes of a sweep have one ladder, of the columns that all of them have: what pilots of some scenes find
     is told to the others."""
-    of_each = [ladder_of(asked, grid).columns for grid in grids]
+    schemes = {open_scheme(grid) for grid in grids}
+    scheme = schemes.pop() if len(schemes) == 1 else AVERAGE_ACCELERATION
+    of_each = [ladder_of(asked, grid, scheme).columns for grid in grids]
     known = set.intersection(*map(set, of_each))
     for grid in grids:
         grid.common = tuple(column for column in of_each[0] if column in known)
@@ -89,15 +89,13 @@ def _models(asked: Asked, grid: SceneGrid) -> list[str]:
 
 
 class March(NamedTuple):
-    """A march of n pilots (by their places) on a rung: error (R, n) of every result, held (n,), whether it tells of
-    finer rungs too (n,), which else none is to take, and modes x steps."""
+    """A march of n pilots (by their places) on a rung: error (R, n) of every result, held (n,), and modes x steps."""
 
     column: int
     rung: int
     lanes: Counts
     error: Array
     held: Array
-    finer: NDArray[np.bool_]
     work: float
 
 
@@ -139,14 +137,11 @@ class Rungs:
         against = error
         if self.aim is not self.truth:
             against = differences(asked, model, values, now, self.aim.outcome.of(lanes))
-        finer = np.ones(lanes.size, dtype=np.bool_)
-        return March(column, rung, lanes, error, worst_held(against, results), finer, work)
+        return March(column, rung, lanes, error, worst_held(against, results), work)
 
-    def climb(
-        self, lanes: Counts, halted: Halted, column: int, start: Counts, floor: Array, most: Array
-    ) -> list[March]:
-        """From rungs ``start`` (P,) of some pilots, until nothing is gained, or the next one would be more work than
-        ``most`` (P,); floor (P,): what the column leaves. Raises Halted."""
+    def climb(self, lanes: Counts, halted: Halted, column: int, start: Counts, floor: Array) -> list[March]:
+        """From rungs ``start`` (P,) of some pilots, until nothing is gained; floor (P,): what the column leaves. Raises
+        Halted."""
         cuts, fine, rung = np.array(self.ladder.cuts), self.fine(column), start.copy()
         active, found = lanes[rung[lanes] < np.minimum(fine[lanes], cuts.size)], list[March]()
         while active.size:
@@ -156,9 +151,8 @@ class Rungs:
             small = now.held <= np.maximum(ENOUGH * self.span[0], FLAT * floor[own])
             rung[own] += 1
             done = small | (rung[own] >= np.minimum(fine[own], cuts.size))
-            dear = ~done & (self.work(column)[min(here + 1, cuts.size - 1)] > most[own])
-            found.append(now._replace(finer=~dear))
-            active = active[~np.isin(active, own[done | dear])]
+            found.append(now)
+            active = active[~np.isin(active, own[done])]
         return found
 
     def first(self, column: int) -> Counts:
@@ -199,11 +193,6 @@ class Rungs:
     def model(self, column: int) -> SceneModel:
         """The scene with the numerics of a column."""
         return self.grid.model(self.ladder.columns[column])
-
-    def work(self, column: int) -> Array:
-        """(cuts,) modes x steps of a column's rungs over one passage or cycle."""
-        steps: Array = self.unit(column) * np.array(self.ladder.cuts, dtype=np.float64)
-        return self.model(column).body_modes * steps
 
     def unit(self, column: int) -> int:
         """Steps of the lowest rung over one passage or cycle."""

@@ -26,8 +26,10 @@ class Scheme(Protocol):
     """What the program asks of a scheme.
 
     name: as in the study file. order: of its error on smooth, resolved scenes. coefficients: for the kernels.
-    stability_limit: largest omega h of an undamped oscillator, infinite where there is none. stride: steps that its
-    coarsest march takes at once.
+    stability_limit: largest omega h of a body's undamped mode, infinite where there is none. oscillator_limit: the same
+    of springs between bodies and what moves on them. scaled_from: omega h from which modes are marched with as much
+    more mass, at this omega h whatever their own; infinite where none is. stride: steps that its coarsest march takes
+    at once.
     """
 
     @property
@@ -40,6 +42,10 @@ class Scheme(Protocol):
     def coefficients(self) -> Newmark | Alpha: ...
     @property
     def stability_limit(self) -> float: ...
+    @property
+    def oscillator_limit(self) -> float: ...
+    @property
+    def scaled_from(self) -> float: ...
 
     def amplification(self, x: float) -> FloatArray:
         """Matrix of one step of an undamped oscillator of omega h = x, on its state in step units."""
@@ -52,6 +58,11 @@ class Scheme(Protocol):
 class NewmarkScheme:
     """A member of Newmark's family: u and u' advance with weights beta and gamma (Newmark 1959).
 
+    With ``scaled_from`` below the limit no mode of a body has one: those that are faster than a step can follow keep
+    stiffness and damping ratio and take as much more mass (selective mass scaling, Olovsson et al. 2005). With
+    gamma = 1/2 this is Newmark's method with a larger beta for each of them,  beta + 1/scaled_from^2 - 1/(omega h)^2,
+    but for the weights of the load.
+
     >>> NewmarkScheme("average-acceleration", beta=1 / 4, gamma=1 / 2).stability_limit
     inf
     >>> round(NewmarkScheme("linear-acceleration", beta=1 / 6, gamma=1 / 2).stability_limit, 3)
@@ -63,6 +74,7 @@ class NewmarkScheme:
     gamma: float
     order: int = 2
     stride: int = 1
+    scaled_from: float = math.inf
 
     @property
     def coefficients(self) -> Newmark:
@@ -71,19 +83,25 @@ class NewmarkScheme:
 
     @property
     def stability_limit(self) -> float:
+        """As of oscillators, and none where modes take mass."""
+        return self.oscillator_limit if math.isinf(self.scaled_from) else math.inf
+
+    @property
+    def oscillator_limit(self) -> float:
         """(gamma/2 - beta)^-1/2, infinite from beta >= gamma/2 on."""
         slack = 0.5 * self.gamma - self.beta
         return math.inf if slack <= 0.0 else 1.0 / math.sqrt(slack)
 
     def amplification(self, x: float) -> FloatArray:
         """On (u, h u'): the accelerations -x^2 u at both ends put into Newmark's formulas."""
+        x = min(x, self.scaled_from)
         new = np.array([[1.0 + self.beta * x**2, 0.0], [self.gamma * x**2, 1.0]])
         old = np.array([[1.0 - (0.5 - self.beta) * x**2, 1.0], [-(1.0 - self.gamma) * x**2, 1.0]])
         return np.asarray(np.linalg.solve(new, old))
 
     def phase(self, x: FloatArray) -> FloatArray:
         """Its cosine is half the trace of the amplification matrix over the root of its determinant."""
-        square = np.minimum(x, _FAR) ** 2
+        square = np.minimum(x, min(self.scaled_from, _FAR)) ** 2
         part = square / (1.0 + self.beta * square)
         modulus = np.sqrt(np.maximum(1.0 - (self.gamma - 0.5) * part, np.finfo(float).tiny))
         return np.asarray(np.arccos(np.clip((1.0 - 0.5 * (self.gamma + 0.5) * part) / modulus, -1.0, 1.0)))
@@ -144,6 +162,16 @@ class AlphaScheme:
         """None: m <= f <= 1/2 and beta >= 1/4 + (f - m)/2 hold for every member offered."""
         return math.inf
 
+    @property
+    def oscillator_limit(self) -> float:
+        """None either."""
+        return math.inf
+
+    @property
+    def scaled_from(self) -> float:
+        """Every mode keeps its mass."""
+        return math.inf
+
     def amplification(self, x: float) -> FloatArray:
         """On the predictors u*, v* and the memory e; the true acceleration is -x^2 u*/(1 + beta x^2)."""
         c = self.coefficients
@@ -190,9 +218,13 @@ class SchemeRow:
         return self.make(given)
 
 
-def _newmark(name: str, beta: float) -> SchemeRow:
-    return SchemeRow(name, lambda given: NewmarkScheme(name, beta, 0.5))
+def _newmark(name: str, beta: float, scaled_from: float = math.inf) -> SchemeRow:
+    return SchemeRow(name, lambda given: NewmarkScheme(name, beta, 0.5, scaled_from=scaled_from))
 
+
+#: omega h from which the scaled scheme gives modes more mass, inside Fox-Goodwin's limit of 2.45: passages took at
+#: least 554, 472, 454, 470 and 467 modes x steps for 1e-3 with 1.2, 1.8, 2.0, 2.2 and 2.3, and 678 without it.
+SCALED = 2.0
 
 #: The scheme where the study names none and nothing speaks for another.
 USUAL_SCHEME = "average-acceleration"
@@ -201,6 +233,7 @@ _ROWS = (
     _newmark("average-acceleration", 1 / 4),
     _newmark("linear-acceleration", 1 / 6),
     _newmark("fox-goodwin", 1 / 12),
+    _newmark("scaled-fox-goodwin", 1 / 12, SCALED),
     _newmark("central-difference", 0.0),
     SchemeRow(
         "newmark",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
@@ -23,7 +24,7 @@ from results_schema.arrays import Array, Counts
 from results_schema.status import Status
 
 if TYPE_CHECKING:
-    from engine.kernels.layout import Observation, State, Ties
+    from engine.kernels.layout import Lanes, Observation, State, Ties
     from engine.march.stepper import Codes
     from engine.march.tables import SceneTables, SegmentTable
     from engine.model.lane_table import LaneTable
@@ -92,27 +93,42 @@ class March:
         return self.resting if segment.rests and self.resting.shape[1] else self.statistics
 
     def start(self, segment: Segment, table: SegmentTable, observed: Observed, before: Segment | None) -> None:
-        """The impulse and the new accelerations of a segment's event, and its first station."""
-        if not self.unseen(segment, before):
-            return
-        model, stepped = self.tables.model, self.lanes.steps_of(self.step_size(segment), table.numbers)
-        if segment.strikes:
-            self._board(segment)
-            struck = ties_with_inertia(model, segment.active)
-            if struck.size:
-                blow = tabulate_blow(model, segment, struck, self.lanes.mass.take(struck, 1), self.lanes.time_scale)
-                strike(blow, self.lanes.gravity, self.state)
-        if segment.fresh:
+        """The impulse and the new accelerations of a segment's event, and its first station, seen with all modes' own
+        masses."""
+        model, stepped = self.tables.model, self.stepped(segment, table)
+        if self.unseen(segment, before):
+            whole = self.lanes.steps_of(self.step_size(segment), table.numbers)
+            if segment.strikes:
+                self._board(segment)
+                struck = ties_with_inertia(model, segment.active)
+                if struck.size:
+                    blow = tabulate_blow(model, segment, struck, self.lanes.mass.take(struck, 1), self.lanes.time_scale)
+                    strike(blow, self.lanes.gravity, stepped.inverse_modal_mass, self.state)
+            if segment.fresh:
+                solve_initial_acceleration(table.ties, whole, self.state)
+            watch_start(table.ties, whole, self.state, *observed, segment.first)
+        if self.is_rescaled(segment, before):
             solve_initial_acceleration(table.ties, stepped, self.state)
-        watch_start(table.ties, stepped, self.state, *observed, segment.first)
 
     def unseen(self, segment: Segment, before: Segment | None) -> bool:
         """Whether the first station of a segment was not observed as the last one of the segment before."""
         return segment.fresh or (segment.recorded and not (before is not None and before.recorded))
 
+    def is_rescaled(self, segment: Segment, before: Segment | None) -> bool:
+        """Whether accelerations are those of other masses of fast modes than a segment's step has."""
+        if math.isinf(self.tables.model.scheme.scaled_from):
+            return False
+        if segment.fresh or before is None:
+            return True
+        return segment.free is not before.free or not math.isclose(segment.step, before.step)
+
+    def stepped(self, segment: Segment, table: SegmentTable) -> Lanes:
+        """The lanes with the step of a segment."""
+        return self.lanes.steps_of(self.step_size(segment), table.numbers, self.tables.model.scheme.scaled_from)
+
     def step(self, segment: Segment, table: SegmentTable, observed: Observed) -> Codes:
         """The steps of a segment, from its station 0, which is settled and seen."""
-        stepped = self.lanes.steps_of(self.step_size(segment), table.numbers)
+        stepped = self.stepped(segment, table)
         scheme = self.tables.scheme
         return step_kernel(table.ties)(table.ties, stepped, self.state, *observed, scheme, segment.first)
 

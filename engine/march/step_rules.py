@@ -48,8 +48,7 @@ def least_steps(model: SceneModel, values: VariantValues) -> Array:
     found = np.maximum(found, LEAST_MARGIN * _alias(model, scale))
     if model.springs:
         found = np.maximum(found, model.scheme.stride * contact_omega(model, values) * scale / (2.0 * np.pi))
-        if np.isfinite(model.scheme.stability_limit):
-            found = np.maximum(found, LIMIT_MARGIN * limit_with_springs(model, values))
+        found = np.maximum(found, limit_with_springs(model, values))
     return found
 
 
@@ -63,8 +62,13 @@ def _alias(model: SceneModel, scale: Array) -> Array:
 
 def free_steps(model: SceneModel) -> int:
     """Steps per first period of free vibration, after the last carriage."""
-    limit = LIMIT_MARGIN * float(model.omega.max()) * 2.0 * math.pi / model.first_omega / model.scheme.stability_limit
-    return max(FREE_STEPS, math.ceil(limit))
+    return max(FREE_STEPS, math.ceil(free_limit(model)))
+
+
+def free_limit(model: SceneModel) -> float:
+    """The least of them within a scheme's limit; springs that are soft beside the modes have that of the modes."""
+    limit = model.scheme.oscillator_limit if model.springs else model.scheme.stability_limit
+    return LIMIT_MARGIN * float(model.omega.max()) * 2.0 * math.pi / model.first_omega / limit
 
 
 def alias_steps(model: SceneModel, time_scale: Array) -> Array:
@@ -223,8 +227,8 @@ def check_steps(model: SceneModel, values: VariantValues, steps: Counts) -> None
     if not model.springs:
         return
     check_free_vibration(model, values)
-    if math.isfinite(model.scheme.stability_limit):
-        _refuse(model, limit_with_springs(model, values), steps, "the step is beyond the scheme's stability limit")
+    least = limit_with_springs(model, values) / LIMIT_MARGIN
+    _refuse(model, least, steps, "the step is beyond the scheme's stability limit")
     least = model.scheme.stride * time_scale * contact_omega(model, values) / (2.0 * math.pi)
     _refuse(model, least, steps, "a step is longer than a period of the contact on its spring: the march could grow")
 
@@ -242,7 +246,7 @@ def are_soft(model: SceneModel, values: VariantValues) -> bool:
 
 def check_free_vibration(model: SceneModel, values: VariantValues) -> None:
     """Refuse free vibration with springs that are not soft by a conditionally stable scheme. Raises BadInput."""
-    if not math.isfinite(model.scheme.stability_limit) or are_soft(model, values):
+    if math.isinf(model.scheme.oscillator_limit) or are_soft(model, values):
         return
     for carriage in model.carriages:
         if vibrates_freely(carriage):
@@ -252,9 +256,15 @@ def check_free_vibration(model: SceneModel, values: VariantValues) -> None:
 
 
 def limit_with_springs(model: SceneModel, values: VariantValues) -> Array:
-    """(V,) steps at which the coupled scene reaches the scheme's limit, at most."""
-    highest = np.sqrt(float(model.omega.max()) ** 2 + contact_omega(model, values) ** 2)
-    return np.asarray(highest * values.scene_time_scale / model.scheme.stability_limit)
+    """(V,) steps with which the coupled scene stays inside the scheme's limit; none where that has no limit.
+
+    No frequency is above (omega_N^2 + omega_c^2)^1/2, and of modes that take mass none above ``scaled_from``/h.
+    """
+    limit, springs = model.scheme.oscillator_limit / LIMIT_MARGIN, contact_omega(model, values)
+    fewest = np.hypot(float(model.omega.max()), springs) / limit
+    if math.isfinite(model.scheme.scaled_from):
+        fewest = np.minimum(fewest, springs / math.sqrt(limit**2 - model.scheme.scaled_from**2))
+    return np.asarray(fewest * values.scene_time_scale)
 
 
 def _refuse(model: SceneModel, least: Array, steps: Counts, what: str) -> None:

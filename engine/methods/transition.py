@@ -143,7 +143,8 @@ def spectral_radius(matrices: Array) -> Array:
 def _held_lanes(model: SceneModel, values: VariantValues, units: int, step: Array) -> Lanes:
     """Lanes without loads: every variant, with its step (V,) in s, once for each of so many unit states."""
     table = _unloaded(lane_table(model, values.part(_variants(values.size, units))))
-    return table.steps_of(to_blocks(step[_variants(values.size, units)]))
+    scaled_from = model.scheme.scaled_from
+    return table.steps_of(to_blocks(step[_variants(values.size, units)]), scaled_from=scaled_from)
 
 
 def _unit_states(lanes: Lanes, scales: Array) -> State:

@@ -121,7 +121,10 @@ def worst(plan: Plan, parts: Sequence[Part]) -> Worst | None:
 
 
 def told_missed(plan: Plan, parts: Sequence[Part]) -> str:
-    """How many of the variants that were looked at miss their tolerance, by how much and what helps; "" where none."""
+    """How many of the variants that were looked at miss their tolerance, by how much and what helps; "" where none, or
+    no pilot does, as planes through few of them rise too far beyond."""
+    if plan.choice is not None and np.all(plan.choice.measured.held.min(axis=(0, 1)) <= 1.0):
+        return ""
     looked_at, missed = sum(part.held.size for part in parts), sum(int((part.held > 1.0).sum()) for part in parts)
     found = worst(plan, parts) if missed else None
     if found is None:

@@ -283,6 +283,8 @@ def scheme_of(study: Study) -> naive.Newmark | naive.GeneralizedAlpha:
         assert solver.rho_inf is not None
         rho = solver.rho_inf
         return naive.GeneralizedAlpha((2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0))
+    if solver.scheme == "scaled-fox-goodwin":
+        return naive.Newmark(1 / 12, 0.5, 2.0)
     return naive.Newmark(BETA[solver.scheme], 0.5)
 
 

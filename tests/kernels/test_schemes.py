@@ -18,6 +18,7 @@ from results_schema.errors import BadInput
 from tests.engine.build import beam, cruise, force, mass, study
 
 X = np.array([1e-3, 0.1, 0.7, 1.5, 1.99])
+FAST = (2.1, 2.45, 10.0, 1e3)  # beyond what a mode of its own mass may have by the scaled scheme
 CONDITIONAL = ("linear-acceleration", "fox-goodwin", "central-difference")
 
 
@@ -60,6 +61,38 @@ def test_phase_is_that_of_the_amplification_matrix(name: str) -> None:
     found = scheme.phase(X)
     wanted = [np.abs(np.angle(np.linalg.eigvals(newmark_matrix(scheme.beta, scheme.gamma, x)))).max() for x in X]
     np.testing.assert_allclose(found, wanted, rtol=1e-7, equal_nan=False)
+
+
+def test_modes_that_take_mass_go_as_by_a_larger_beta() -> None:
+    """The same eigenvalues, on the unit circle; and the angle that the scheme tells."""
+    scheme = SCHEMES["scaled-fox-goodwin"]({})
+    for x in (*X, *FAST):
+        larger = newmark_matrix(1 / 12 + max(0.0, 1 / scheme.scaled_from**2 - 1 / x**2), 0.5, x)
+        found = scheme.amplification(float(x))
+        assert np.abs(np.poly(np.linalg.eigvals(found)) - np.poly(np.linalg.eigvals(larger))).max() < 1e-12
+        assert abs(radius(found) - 1.0) < 1e-12
+        angle = float(np.abs(np.angle(np.linalg.eigvals(found))).max())
+        assert float(scheme.phase(np.array([x]))[0]) == pytest.approx(angle, rel=1e-7)
+
+
+@pytest.mark.parametrize("modes", [5, 12])
+@pytest.mark.parametrize("speed", [0.1, 0.6])
+def test_a_moving_mass_does_not_resonate_with_modes_that_take_mass(modes: int, speed: float) -> None:
+    """Growth by a passage from the rule's steps on; Fox-Goodwin alone, with so few, blows up in the slower one."""
+    worst = {}
+    for name in ("scaled-fox-goodwin", "fox-goodwin"):
+        solver = {"scheme": name}
+        given = study(beam(modes=modes), mass(1.0, cruise(0.0, 1.0, speed * math.pi)), solver=solver)
+        scene = build_model(given, {}, {})
+        values = VariantValues(scene.study, {"carriage.car.mass": np.repeat([0.25, 0.5, 1.0, 2.0], 2)}, 8)
+        rule = least_steps(SCHEMES["scaled-fox-goodwin"]({}), modes, speed * math.pi)
+        growth = [
+            spectral_radius(transitions(SceneTables(scene, math.ceil(rule * part), "whole"), values))
+            for part in (1.1, 1.3, 1.5, 2.0, 3.0)
+        ]
+        worst[name] = float(np.max(growth))
+    assert worst["scaled-fox-goodwin"] < 1.25
+    assert worst["fox-goodwin"] > 1e10 or speed > 0.1
 
 
 @pytest.mark.parametrize("name", CONDITIONAL)
@@ -132,7 +165,7 @@ def least_steps(scheme: Scheme, modes: int = 12, speed: float = 0.3) -> float:
     return float(steps[np.argmax(turned < math.pi)])
 
 
-@pytest.mark.parametrize("name", ["average-acceleration", "richardson", *CONDITIONAL])
+@pytest.mark.parametrize("name", ["average-acceleration", "richardson", "scaled-fox-goodwin", *CONDITIONAL])
 def test_too_few_steps_for_the_alias_rule_are_refused(name: str) -> None:
     stride = SCHEMES[name]({}).stride
     least = least_steps(SCHEMES[name]({})) * 1.1  # of the pair's coarser march

@@ -148,6 +148,7 @@ SCHEMES: dict[str, tuple[dict[str, Any], float]] = {
     "half": ({"scheme": "newmark", "beta": 0.3, "gamma": 0.5}, 2.0),
     "damped": ({"scheme": "newmark", "beta": 0.3025, "gamma": 0.6}, 1.0),
     "fox-goodwin": ({"scheme": "fox-goodwin"}, 2.0),
+    "scaled-fox-goodwin": ({"scheme": "scaled-fox-goodwin"}, 2.0),
     "hht-alpha": ({"scheme": "hht-alpha", "alpha": -0.05}, 2.0),
     "hht-alpha, most": ({"scheme": "hht-alpha", "alpha": -1 / 3}, 2.0),
     "generalized-alpha": ({"scheme": "generalized-alpha", "rho_inf": 0.8}, 2.0),

@@ -1,7 +1,8 @@
 """Newmark's method with dense matrices, one solve per step."""
 
+import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -24,10 +25,11 @@ Strike = Callable[[float, State], Array]
 
 
 class Newmark(NamedTuple):
-    """Parameters of the scheme; the default is average acceleration."""
+    """Parameters of the scheme; the default is average acceleration. scaled_from: as of `slowed`."""
 
     beta: float = 0.25
     gamma: float = 0.5
+    scaled_from: float = math.inf
 
 
 class GeneralizedAlpha(NamedTuple):
@@ -117,6 +119,15 @@ def collect(
     return History(t, q, v, np.array(a), force, position, under, tuple(before))
 
 
+def slowed(scene: Scene, scheme: Newmark | GeneralizedAlpha, h: float) -> Scene:
+    """The scene whose modes with omega h beyond ``scaled_from`` have so much more mass that it is this, their stiffness
+    and damping ratios the same."""
+    if not isinstance(scheme, Newmark) or math.isinf(scheme.scaled_from):
+        return scene
+    times = np.maximum(1.0, scene.omega * h / scheme.scaled_from)
+    return replace(scene, modal_mass=times**2, zeta=scene.zeta * times)
+
+
 def _weights(scheme: Newmark | GeneralizedAlpha) -> tuple[float, float, float, float]:
     """beta, gamma, alpha_m, alpha_f."""
     if isinstance(scheme, Newmark):
@@ -141,15 +152,16 @@ def march(
     unknown accelerations are solved for at once. At an event the impulse is added and q'' computed anew with the
     matrices just after it. at, strike: the scene of an instant and the impulse where they are not the scene's own.
     """
-    at = at or (lambda t, side: scene)
-    strike = strike or (lambda t, state: impulse(scene, t, state))
-    beta, gamma, m_, f_ = _weights(scheme or Newmark())
+    at, scheme = at or (lambda t, side: scene), scheme or Newmark()
+    beta, gamma, m_, f_ = _weights(scheme)
     t, inner = snapped(scene, times)
+    steps = np.append(np.diff(t), t[-1] - t[-2])
     n_modes, one = len(scene.omega), np.eye(len(scene.omega))
     states, true, before = [start], [acceleration(at(t[0], "right"), t[0], start, "right")], []
-    a = true[0]
+    a = acceleration(slowed(at(t[0], "right"), scheme, steps[0]), t[0], start, "right")
     for n in range(1, len(t)):
-        h, (q, v), here = t[n] - t[n - 1], states[-1], at(t[n], "left")
+        h, (q, v) = steps[n - 1], states[-1]
+        here, there = slowed(at(t[n], "left"), scheme, h), slowed(at(t[n], "right"), scheme, steps[n])
         u_star = q + h * v + (0.5 - beta) * h**2 * a
         v_star = v + (1.0 - gamma) * h * a
         m, c, k, f = system(here, t[n], "left")
@@ -159,8 +171,11 @@ def march(
         state = State(u_star + beta * h**2 * a, v_star + gamma * h * a)
         if n in inner:
             before.append(Event(n, t[n], state.v, now, contact_forces(here, t[n], state, now, "left")))
-            state = State(state.q, state.v + strike(t[n], state))
+            blow = impulse(slowed(scene, scheme, steps[n]), t[n], state) if strike is None else strike(t[n], state)
+            state = State(state.q, state.v + blow)
             now = a = acceleration(at(t[n], "right"), t[n], state, "right")
+        if there.modal_mass is not None and (n in inner or not math.isclose(h, steps[n])):
+            a = acceleration(there, t[n], state, "right")
         states.append(state)
         true.append(now)
     return collect(scene, t, states, true, before, at)

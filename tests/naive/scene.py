@@ -147,7 +147,7 @@ class Scene:
 
     phi(s, derivative) -> (N,), unit modal mass; omega (N,) rad/s; zeta (N,); own_weight (N,) modal force of gravity.
     Where masses are sprung, N counts them too: phi and omega are zero there. missed(x, s): m at x per N at s that modes
-    left out would add; None where nothing is.
+    left out would add; None where nothing is. modal_mass (N,): of modes that have another than unity.
     """
 
     phi: Shape
@@ -157,6 +157,7 @@ class Scene:
     dampers: tuple[Damper, ...] = ()
     own_weight: Array | None = None
     missed: Callable[[float, float], float] | None = None
+    modal_mass: Array | None = None
 
 
 class System(NamedTuple):
@@ -231,7 +232,7 @@ def _none(scene: Scene) -> Forces:
 
 def system(scene: Scene, t: float, side: Side) -> System:
     """The coupled matrices just before or just after t, assembled as in the module's docstring."""
-    mass = np.eye(len(scene.omega))
+    mass = np.eye(len(scene.omega)) if scene.modal_mass is None else np.diag(scene.modal_mass)
     damping = np.diag(2.0 * scene.zeta * scene.omega)
     stiffness = np.diag(scene.omega**2)
     force = np.zeros(len(scene.omega)) if scene.own_weight is None else scene.own_weight.copy()

@@ -120,8 +120,8 @@ def solve_initial_acceleration(ties, lanes, state):
 
 
 @kernel
-def strike(blow, gravity, state):
-    """Impulses of ties: dq' = -(I + m phi phi^T)^-1 m phi jump (mechanics section 5), all ties at once.
+def strike(blow, gravity, inverse_modal_mass, state):
+    """Impulses of ties: dq' = -(M + m phi phi^T)^-1 m phi jump (mechanics section 5), all ties at once.
 
     The jump of tie r is the velocity that its contact point has and the carriage has not: ``arrives`` phi.q' +
     ``speed`` (phi'.q + g sag'), speed in m/s being that of an arriving carriage or the change of a reversing one.
@@ -139,13 +139,15 @@ def strike(blow, gravity, state):
                 for s in range(many):
                     matrix[r, s] = 0.0
                     for k in range(modes):
-                        matrix[r, s] += blow.mass[block, r, j] * blow.shape[r, k] * blow.shape[s, k]
+                        mobile = inverse_modal_mass[block, k, j]
+                        matrix[r, s] += blow.mass[block, r, j] * blow.shape[r, k] * (mobile * blow.shape[s, k])
                 matrix[r, r] += 1.0
                 impulse[r] = -blow.mass[block, r, j] * (blow.arrives[r] * rate + blow.speed[block, r, j] * slope)
             solve_in_place(matrix, impulse)
             for k in range(modes):
                 for r in range(many):
-                    state.v[block, k, j] += blow.shape[r, k] * impulse[r]
+                    mobile = inverse_modal_mass[block, k, j]
+                    state.v[block, k, j] += mobile * (blow.shape[r, k] * impulse[r])
 
 
 @kernel
