@@ -60,7 +60,7 @@ def test_vibration_is_what_does_not_follow_the_load_slowly() -> None:
     """The largest second difference of histories about statics, of one that is marched and of one that rests."""
     plan, _ = whole()
     (grid,) = plan.grids
-    values = VariantValues.of(grid.scene.study, plan.cases, np.arange(0, plan.size, 20))
+    values = VariantValues.of(grid.scene.study, plan.cases, np.arange(0, plan.size, 7))
     marches = [(grid.tables(model, 8), values, grid.stations(model, 8)) for model in map(grid.model, of_both())]
     moving, resting = (outcome(plan.asked, *march) for march in marches)
     heard = vibration(*marches[0], moving), vibration(*marches[1], resting)
