@@ -214,7 +214,7 @@ def tabulate_blow(model: SceneModel, segment: Segment, ties: Counts, mass: Array
     """
     slope = np.zeros((ties.size, model.omega.size))
     sag_slope, arrives, speed = np.zeros(ties.size), np.zeros(ties.size), np.zeros_like(mass)
-    along = _here(model, segment)
+    along = _here(model, segment, segment.start)
     shape = np.ascontiguousarray(tie_shapes(model, ties.tolist(), along)[0].T)
     for number, r in enumerate(ties):
         push = model.pushes[r - model.first_push] if r >= model.first_push else None
@@ -231,9 +231,24 @@ def tabulate_blow(model: SceneModel, segment: Segment, ties: Counts, mass: Array
     return Impulse(shape, slope, sag_slope, arrives, mass, speed)
 
 
-def _here(model: SceneModel, segment: Segment) -> Along:
-    """All riders as they are at the beginning of a segment."""
-    found, at, still = [], np.array([segment.start]), np.zeros(1)
+def rate_jumps(model: SceneModel, segment: Segment, before: Segment | None) -> Array:
+    """(C, N) by how much faster modal forces of unit weights of the carriages grow after a segment's beginning than
+    before, per unit of scene time: where one comes on, leaves or turns."""
+    found = np.zeros((len(model.carriages), model.omega.size))
+    for sign, side in ((1.0, segment), (-1.0, before)):
+        along = () if side is None else _here(model, side, segment.start)
+        for number, way in enumerate(along):
+            if side is None or not way.active:
+                continue
+            path = model.riders[number].path_on_body(np.array([segment.start]), side.start, side.end)
+            [attachment], modes = model.attachments[number], model.bodies[model.carriages[number].body].modes
+            found[number, modes] += sign * float(path.dS[0]) * shape_rows(model, attachment, along, 1)[0]
+    return found
+
+
+def _here(model: SceneModel, segment: Segment, time: float) -> Along:
+    """All riders as they are at an instant of a segment."""
+    found, at, still = [], np.array([time]), np.zeros(1)
     for rider, active in zip(model.riders, segment.active, strict=True):
         place = rider.path_on_body(at, segment.start, segment.end).S if active else still
         found.append(StationPath(place, still, still, active))

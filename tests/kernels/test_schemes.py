@@ -75,6 +75,20 @@ def test_modes_that_take_mass_go_as_by_a_larger_beta() -> None:
         assert float(scheme.phase(np.array([x]))[0]) == pytest.approx(angle, rel=1e-7)
 
 
+@pytest.mark.parametrize("x", [0.3, 1.9, 2.5, 40.0])
+def test_modes_swing_about_a_load_that_grows_as_in_truth(x: float) -> None:
+    """One mode of unit frequency, at rest, under a load t: by the first step of Newmark's formulas it swings about t by
+    one, whatever its mass; without a velocity at the start by more."""
+    scheme = SCHEMES["scaled-fox-goodwin"]({})
+    assert isinstance(scheme, NewmarkScheme)
+    mass, h, angle = max(1.0, (x / scheme.scaled_from) ** 2), x, float(scheme.phase(np.array([x]))[0])
+    amplitudes = []
+    for v in (float(scheme.velocity_at_kinks(np.array([x]))[0]) * h**2, 0.0):
+        a = (h - h * v) / (mass + scheme.beta * h**2)
+        amplitudes.append((h - h * v - scheme.beta * h**2 * a) / math.sin(angle))
+    assert amplitudes[0] == pytest.approx(1.0, rel=1e-9) and amplitudes[1] > 1.005
+
+
 @pytest.mark.parametrize("modes", [5, 12])
 @pytest.mark.parametrize("speed", [0.1, 0.6])
 def test_a_moving_mass_does_not_resonate_with_modes_that_take_mass(modes: int, speed: float) -> None:

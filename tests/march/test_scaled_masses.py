@@ -43,8 +43,16 @@ def struck_alone(scene: newmark.Scene, t: float, state: State) -> np.ndarray:
     return newmark_impulse(replace(scene, modal_mass=None), t, state)
 
 
+def no_jump(scene: newmark.Scene, *others: object, first: bool) -> np.ndarray:
+    return np.zeros_like(scene.omega)
+
+
 newmark_impulse = newmark.impulse
-PARTS = {"in the steps": ("slowed", own_masses, 24), "in impulses": ("impulse", struck_alone, 30)}
+PARTS = {
+    "in the steps": ("slowed", own_masses, 24),
+    "in impulses": ("impulse", struck_alone, 30),
+    "where forces begin to grow": ("velocity_at_kink", no_jump, 30),
+}
 
 
 @pytest.mark.parametrize("part", PARTS)

@@ -128,6 +128,21 @@ def slowed(scene: Scene, scheme: Newmark | GeneralizedAlpha, h: float) -> Scene:
     return replace(scene, modal_mass=times**2, zeta=scene.zeta * times)
 
 
+def velocity_at_kink(scene: Scene, scheme: Newmark | GeneralizedAlpha, t: float, h: float, first: bool) -> Array:
+    """Jump dq' where the forces of loads begin to grow faster, of a scheme with masses of `slowed`: so that modes swing
+    about r t/omega^2 by r/omega^3."""
+    if not isinstance(scheme, Newmark) or math.isinf(scheme.scaled_from):
+        return np.zeros_like(scene.omega)
+    rate = np.zeros_like(scene.omega)
+    for load in scene.loads:
+        for sign, phase in ((1.0, load.phase(t, "right")), (-1.0, None if first else load.phase(t, "left"))):
+            if phase is not None:
+                rate += sign * load.weight * phase.ds(t) * scene.phi(phase.s(t), 1)
+    seen = np.minimum(scene.omega * h, scheme.scaled_from)
+    slower = seen / (scene.omega * h)
+    return np.asarray(rate / scene.omega**2 * (1.0 - slower * np.sqrt(1.0 - seen**2 / 6.0)))
+
+
 def _weights(scheme: Newmark | GeneralizedAlpha) -> tuple[float, float, float, float]:
     """beta, gamma, alpha_m, alpha_f."""
     if isinstance(scheme, Newmark):
@@ -156,6 +171,7 @@ def march(
     beta, gamma, m_, f_ = _weights(scheme)
     t, inner = snapped(scene, times)
     steps = np.append(np.diff(t), t[-1] - t[-2])
+    start = State(start.q, start.v + velocity_at_kink(scene, scheme, t[0], steps[0], first=True))
     n_modes, one = len(scene.omega), np.eye(len(scene.omega))
     states, true, before = [start], [acceleration(at(t[0], "right"), t[0], start, "right")], []
     a = acceleration(slowed(at(t[0], "right"), scheme, steps[0]), t[0], start, "right")
@@ -172,7 +188,8 @@ def march(
         if n in inner:
             before.append(Event(n, t[n], state.v, now, contact_forces(here, t[n], state, now, "left")))
             blow = impulse(slowed(scene, scheme, steps[n]), t[n], state) if strike is None else strike(t[n], state)
-            state = State(state.q, state.v + blow)
+            kink = velocity_at_kink(scene, scheme, t[n], steps[n], first=False)
+            state = State(state.q, state.v + blow + kink)
             now = a = acceleration(at(t[n], "right"), t[n], state, "right")
         if there.modal_mass is not None and (n in inner or not math.isclose(h, steps[n])):
             a = acceleration(there, t[n], state, "right")
