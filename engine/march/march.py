@@ -105,17 +105,16 @@ class March:
                     blow = tabulate_blow(model, segment, struck, self.lanes.mass.take(struck, 1), self.lanes.time_scale)
                     strike(blow, self.lanes.gravity, stepped.inverse_modal_mass, self.state)
             if segment.fresh:
-                self._take_rates(segment, before)
                 solve_initial_acceleration(table.ties, whole, self.state)
             watch_start(table.ties, whole, self.state, *observed, segment.first)
         if self.is_rescaled(segment, before):
+            if segment.fresh:
+                self._take_rates(segment, before)
             solve_initial_acceleration(table.ties, stepped, self.state)
 
     def _take_rates(self, segment: Segment, before: Segment | None) -> None:
         """Velocities jump where modal forces begin to grow faster, as those of Fox-Goodwin are no derivatives."""
         model = self.tables.model
-        if math.isinf(model.scheme.scaled_from):
-            return
         step, weights = self.step_size(segment)[:, None], self.lanes.of_carriages / self.lanes.time_scale[:, None]
         rates = np.einsum("bcj,ck->bkj", weights, rate_jumps(model, segment, before))
         self.state.v[...] += rates * step**2 * model.scheme.velocity_at_kinks(model.omega[:, None] * step)

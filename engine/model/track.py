@@ -236,13 +236,15 @@ def rate_jumps(model: SceneModel, segment: Segment, before: Segment | None) -> A
     before, per unit of scene time: where one comes on, leaves or turns."""
     found = np.zeros((len(model.carriages), model.omega.size))
     for sign, side in ((1.0, segment), (-1.0, before)):
-        along = () if side is None else _here(model, side, segment.start)
-        for number, way in enumerate(along):
-            if side is None or not way.active:
-                continue
-            path = model.riders[number].path_on_body(np.array([segment.start]), side.start, side.end)
-            [attachment], modes = model.attachments[number], model.bodies[model.carriages[number].body].modes
-            found[number, modes] += sign * float(path.dS[0]) * shape_rows(model, attachment, along, 1)[0]
+        if side is None:
+            continue
+        along = _here(model, side, segment.start)
+        for number, carriage in enumerate(model.carriages):
+            for load in carriage.attachments:
+                if load.rider is not None and along[load.rider].active:
+                    path = model.riders[load.rider].path_on_body(np.array([segment.start]), side.start, side.end)
+                    slope = shape_rows(model, load, along, 1)[0]
+                    found[number, model.bodies[load.body].modes] += sign * load.factor * float(path.dS[0]) * slope
     return found
 
 

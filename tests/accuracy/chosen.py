@@ -41,7 +41,7 @@ STUDIES: dict[str, Study] = {
     "tight": sweep(2e-3),
     "wide": sweep(5e-2),
     "swept tolerance": sweep(sweep=SPEEDS | WEIGHTS | {"wanted": {"of": TOLERANCE, "values": [2e-3, 1e-2, 5e-2]}}),
-    "more modes than its steps need": sweep(bed=beam(modes=MAX_MODES, damping_ratio=0.02)),
+    "more modes than its steps need": sweep(1e-3, bed=beam(modes=MAX_MODES, damping_ratio=0.02)),
     "numbers of modes": sweep(
         bed=OPEN,
         sweep=SPEEDS | WEIGHTS | {"kept": {"of": "body.bed.modes", "values": [4, 8, MAX_MODES]}},

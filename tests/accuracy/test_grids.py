@@ -147,8 +147,8 @@ def test_bodies_that_ride_have_statics_and_the_full_model() -> None:
 
 @cache
 def climbed() -> Measured:
-    """What twelve pilots found."""
-    grid = only_grid(passages(4, 3, solver={"tolerance": 1e-2}))
+    """What fifteen pilots found."""
+    grid = only_grid(passages(5, 3, solver={"tolerance": 1e-2}))
     return Climb(grid, grid.values, ladder_of(grid.asked, grid)).go()
 
 

@@ -39,7 +39,7 @@ def test_few_variants_converge_each_by_itself() -> None:
 
 
 def test_many_are_marched_with_what_is_chosen() -> None:
-    groups = run_of("passages").plan.groups
+    groups = run_of("tight").plan.groups
     assert all(isinstance(group, MarchGroup) for group in groups) and len(groups) > 3
     variants = np.concatenate([group.variants for group in groups])
     assert sorted(variants.tolist()) == list(range(300))

@@ -171,12 +171,12 @@ def march(
     beta, gamma, m_, f_ = _weights(scheme)
     t, inner = snapped(scene, times)
     steps = np.append(np.diff(t), t[-1] - t[-2])
-    start = State(start.q, start.v + velocity_at_kink(scene, scheme, t[0], steps[0], first=True))
     n_modes, one = len(scene.omega), np.eye(len(scene.omega))
+    v = start.v + velocity_at_kink(scene, scheme, t[0], steps[0], first=True)
     states, true, before = [start], [acceleration(at(t[0], "right"), t[0], start, "right")], []
-    a = acceleration(slowed(at(t[0], "right"), scheme, steps[0]), t[0], start, "right")
+    a = acceleration(slowed(at(t[0], "right"), scheme, steps[0]), t[0], State(start.q, v), "right")
     for n in range(1, len(t)):
-        h, (q, v) = steps[n - 1], states[-1]
+        h, q = steps[n - 1], states[-1].q
         here, there = slowed(at(t[n], "left"), scheme, h), slowed(at(t[n], "right"), scheme, steps[n])
         u_star = q + h * v + (0.5 - beta) * h**2 * a
         v_star = v + (1.0 - gamma) * h * a
@@ -184,15 +184,16 @@ def march(
         both = np.block([[m, gamma * h * c + beta * h**2 * k], [-(1.0 - f_) * one, (1.0 - m_) * one]])
         x = np.linalg.solve(both, np.concatenate([f - c @ v_star - k @ u_star, f_ * true[-1] - m_ * a]))
         now, a = x[:n_modes], x[n_modes:]
-        state = State(u_star + beta * h**2 * a, v_star + gamma * h * a)
+        v = v_star + gamma * h * a
+        state = State(u_star + beta * h**2 * a, v)
         if n in inner:
             before.append(Event(n, t[n], state.v, now, contact_forces(here, t[n], state, now, "left")))
             blow = impulse(slowed(scene, scheme, steps[n]), t[n], state) if strike is None else strike(t[n], state)
-            kink = velocity_at_kink(scene, scheme, t[n], steps[n], first=False)
-            state = State(state.q, state.v + blow + kink)
+            state = State(state.q, state.v + blow)
             now = a = acceleration(at(t[n], "right"), t[n], state, "right")
+            v = state.v + velocity_at_kink(scene, scheme, t[n], steps[n], first=False)
         if there.modal_mass is not None and (n in inner or not math.isclose(h, steps[n])):
-            a = acceleration(there, t[n], state, "right")
+            a = acceleration(there, t[n], State(state.q, v), "right")
         states.append(state)
         true.append(now)
     return collect(scene, t, states, true, before, at)
