@@ -114,8 +114,8 @@ class March:
 
     def _take_rates(self, segment: Segment, before: Segment | None) -> None:
         """Velocities jump where modal forces begin to grow faster, as those of Fox-Goodwin are no derivatives."""
-        model = self.tables.model
-        step, weights = self.step_size(segment)[:, None], self.lanes.of_carriages / self.lanes.time_scale[:, None]
+        model, step = self.tables.model, self.step_size(segment)[:, None]
+        weights = self.lanes.weight[:, : len(model.carriages)] / self.lanes.time_scale[:, None]
         rates = np.einsum("bcj,ck->bkj", weights, rate_jumps(model, segment, before))
         self.state.v[...] += rates * step**2 * model.scheme.velocity_at_kinks(model.omega[:, None] * step)
 

@@ -29,6 +29,7 @@ from tests.reference.closed_forms import PinnedBeam
 SCHEMES: dict[str, dict[str, Any]] = {
     "average": {"scheme": "average-acceleration"},
     "fox-goodwin": {"scheme": "fox-goodwin"},
+    "scaled": {"scheme": "scaled-fox-goodwin"},
     "damped": {"scheme": "newmark", "beta": 0.3025, "gamma": 0.6},
     "hht": {"scheme": "hht-alpha", "alpha": -0.2},
     "generalized": {"scheme": "generalized-alpha", "rho_inf": 0.4},
@@ -37,6 +38,7 @@ SCHEMES: dict[str, dict[str, Any]] = {
 WEIGHTS = {
     "average": naive.Newmark(),
     "fox-goodwin": naive.Newmark(1 / 12, 1 / 2),
+    "scaled": naive.Newmark(1 / 12, 1 / 2, 2.0),
     "damped": naive.Newmark(0.3025, 0.6),
     "hht": naive.GeneralizedAlpha(0.0, 0.2),
     "generalized": naive.GeneralizedAlpha(-1 / 7, 2 / 7),
@@ -97,8 +99,9 @@ def test_one_period_of_a_shuttle_equals_the_dense_twin() -> None:
     assert close(found[0], passage(twin, "hht", np.linspace(0.0, 1 / frequency, 81)))
 
 
-def test_weights_and_gravity_do_not_enter() -> None:
-    study, model = scene()
+@pytest.mark.parametrize("name", ["average", "scaled"])
+def test_weights_and_gravity_do_not_enter(name: str) -> None:
+    study, model = scene(name)
     heavy = build_model(other := study.with_values({"gravity": 1e6, "body.bed.own_weight": True}), {}, {})
     found = [
         transitions(SceneTables(m, 50, "whole"), VariantValues(s, {}, 1)) for s, m in ((study, model), (other, heavy))
