@@ -7,6 +7,7 @@ MARCHED = {
     "average-acceleration": "average acceleration",
     "linear-acceleration": "linear acceleration",
     "fox-goodwin": "Fox-Goodwin",
+    "scaled-fox-goodwin": "Fox-Goodwin with scaled masses",
     "central-difference": "central difference",
     "hht-alpha": "HHT-alpha (\N{MINUS SIGN}0.05)",
     "generalized-alpha": "generalized-alpha (0.8)",

@@ -25,6 +25,11 @@ def newmark(x: Array, beta: float, gamma: float) -> Array:
     return np.asarray(np.maximum(np.abs(half_trace + root), np.abs(half_trace - root)))
 
 
+def scaled_fox_goodwin(x: Array) -> Array:
+    """(n,) spectral radius of Fox-Goodwin where modes of omega h above 2 take so much mass that it is 2."""
+    return newmark(np.minimum(x, 2.0), beta=1 / 12, gamma=0.5)
+
+
 def generalized_alpha(x: Array, alpha_m: float, alpha_f: float) -> Array:
     """(n,) spectral radius of generalized-alpha on (u, h u', h^2 a) (Chung and Hulbert 1993, equation 13)."""
     gamma = 0.5 - alpha_m + alpha_f
@@ -117,5 +122,6 @@ METHODS: tuple[Method, ...] = (
     generalized(0.0),
     Method("wilson-theta (1.4)", partial(wilson, theta=1.4), compared="wilson-theta"),
     Method("rk4", runge_kutta, math.sqrt(8.0), compared="rk4"),
+    Method("scaled-fox-goodwin", scaled_fox_goodwin, solver={"scheme": "scaled-fox-goodwin"}),
 )
 LABELS = tuple(method.label for method in METHODS)
