@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 
 Numbers = NDArray[np.int32]
 
-# What is said of the next three was measured on 60 random sweeps at 1e-2, 1e-3 and 1e-4, 64 variants of each judged.
 #: Of the estimated errors for pilots that were left out are no smaller than the true ones: by 0.985 1.9 % of those of
 #: `asymmetry` and `asymmetry-on-springs` were told too small, 1.3 by this, for a tenth and a twentieth more work.
 SURE = 0.99
+# What is said of the next two was measured on 60 random sweeps at 1e-2, 1e-3 and 1e-4, 64 variants of each judged.
 TELLING = (0.02, 10.0)  # of the tolerance: errors that tell; with 0.3 to 1.2 some variants of `double-peak` missed it
 WIDER = 10.0  # times beyond these, errors of a plane count as if they were no farther: 1 told 0.5 % more too small
 #: Against the slopes of a plane over places from 0 to 1, in squares of logarithms: 0.1 to 3 told and took alike.
