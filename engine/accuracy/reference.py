@@ -294,12 +294,13 @@ def _by(grid: SceneGrid, values: VariantValues, levels: Levels, level: int) -> C
     own = MARGIN * least_steps(model, values)
     if level:  # what few modes decide tells of steps alone, also where the last modes are hardly more than those before
         own = np.maximum(own, 2.0 * grid.unit * _by(grid, values, levels, level - 1))
-    if not np.isfinite(model.scheme.stability_limit):
-        periods = values.scene_time_scale * model.first_omega / (2.0 * np.pi)
-        own = np.maximum(own, FIRST_PERIODS * 4.0**level * periods)
+    periods = values.scene_time_scale * model.first_omega / (2.0 * np.pi)
     if np.isfinite(model.scheme.scaled_from):
         whole = float(model.omega.max()) * values.scene_time_scale / model.scheme.scaled_from
-        own = np.maximum(own, np.minimum(whole, FIRST_WHOLE * 4.0**level * periods))
+        most = FIRST_WHOLE if open_bodies(grid.scene.study) else FIRST_PERIODS  # of modes that a study fixes few move
+        own = np.maximum(own, np.minimum(whole, most * 4.0**level * periods))
+    elif not np.isfinite(model.scheme.stability_limit):
+        own = np.maximum(own, FIRST_PERIODS * 4.0**level * periods)
     return np.asarray(np.exp2(np.ceil(np.log2(np.maximum(wanted, own) / grid.unit).clip(0.0) - 1e-9)), dtype=np.int64)
 
 
