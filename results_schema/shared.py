@@ -63,7 +63,7 @@ declare(
         steps_used | | | int32 | number of steps used
             steps over one passage or cycle
         scheme_used | | - | optional int8 | time integration scheme used
-            where it is left open Fox-Goodwin's, its fast modes with more mass, or average acceleration, see docs/study-file.md
+            where it is left open Fox-Goodwin's, with more mass of fast modes, or average acceleration
         diverged_step | | | optional int64 | first step at which the variant had diverged
             counted from the start; -1 where it did not diverge
         work | | | optional | work of the variant
