@@ -195,13 +195,14 @@ def open_scheme(grid: SceneGrid) -> Scheme:
     """The scheme of a study that leaves it open: Fox-Goodwin's, whose fast modes take mass; average acceleration, which
     has no limit, where springs are stiff: beside modes in free vibration, or so that their limit asks for more steps
     than average acceleration takes to be close."""
+    if not grid.scene.springs:
+        return SWIFT
     fewest = grid.mode_levels[0] if open_bodies(grid.scene.study) else 0
     model = grid.model(grid.scene.numerics._replace(scheme=SWIFT, modes=fewest))
     if any(vibrates_freely(carriage) for carriage in model.carriages) and not are_soft(model, grid.values):
         return AVERAGE_ACCELERATION
     close = CLOSE_STEPS * grid.values.scene_time_scale * model.first_omega / (2.0 * np.pi)
-    is_stiff = bool(model.springs) and np.any(limit_with_springs(model, grid.values) > close)
-    return AVERAGE_ACCELERATION if is_stiff else SWIFT
+    return AVERAGE_ACCELERATION if np.any(limit_with_springs(model, grid.values) > close) else SWIFT
 
 
 AVERAGE_ACCELERATION, SWIFT = (SCHEMES[name]({}) for name in ("average-acceleration", "scaled-fox-goodwin"))

@@ -1,9 +1,9 @@
 """Marches with more and more modes and steps until what they report stays where it is: the truth that errors are
 measured against, and the answer of studies of few variants.
 
-The levels double the modes and take four times as many steps each. d being what a
-result still changed to a level, and r the ratio of two changes in a row, d (r + r^2 + ...) = d r/(1 - r) is left. As
-ratios vary by chance, five times that is told where it is far below d, and no less than a half of d.
+The levels double the modes and take four times as many steps each. d being what a result still changed to a level, and
+r the ratio of two changes in a row, d (r + r^2 + ...) = d r/(1 - r) is left. As ratios vary by chance, five times that
+is told where it is far below d, and no less than a half of d.
 """
 
 from __future__ import annotations
