@@ -196,13 +196,14 @@ def open_scheme(grid: SceneGrid) -> Scheme:
     has no limit, where springs are stiff: beside modes in free vibration, or so that their limit asks for more steps
     than average acceleration takes to be close."""
     if not grid.scene.springs:
-        return SWIFT
+        return SCALED_FOX_GOODWIN
     fewest = grid.mode_levels[0] if open_bodies(grid.scene.study) else 0
-    model = grid.model(grid.scene.numerics._replace(scheme=SWIFT, modes=fewest))
+    model = grid.model(grid.scene.numerics._replace(scheme=SCALED_FOX_GOODWIN, modes=fewest))
     if any(vibrates_freely(carriage) for carriage in model.carriages) and not are_soft(model, grid.values):
         return AVERAGE_ACCELERATION
     close = CLOSE_STEPS * grid.values.scene_time_scale * model.first_omega / (2.0 * np.pi)
-    return AVERAGE_ACCELERATION if np.any(limit_with_springs(model, grid.values) > close) else SWIFT
+    return AVERAGE_ACCELERATION if np.any(limit_with_springs(model, grid.values) > close) else SCALED_FOX_GOODWIN
 
 
-AVERAGE_ACCELERATION, SWIFT = (SCHEMES[name]({}) for name in ("average-acceleration", "scaled-fox-goodwin"))
+AVERAGE_ACCELERATION = SCHEMES["average-acceleration"]({})
+SCALED_FOX_GOODWIN = SCHEMES["scaled-fox-goodwin"]({})

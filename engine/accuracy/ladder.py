@@ -32,7 +32,7 @@ SIMPLER = (("static", Fidelity.STATIC), ("force", Fidelity.FORCE), ("mass", Fide
 CUTS = tuple(sorted({2**k for k in range(16)} | {3 * 2**k for k in range(15)}))  # steps in one of the grid's
 #: Steps at which a column's modes are judged, per first period and in one of the grid's: by Fox-Goodwin (1e-8 of phase
 #: a period), and by schemes of second order (1e-5). With half of them `double-peak` took 1.7 times the work.
-FINE = {**dict.fromkeys(("fox-goodwin", "scaled-fox-goodwin"), (128.0, 16.0)), "": (512.0, 32.0)}
+FINE = {"fox-goodwin": (128.0, 16.0), "scaled-fox-goodwin": (128.0, 16.0), "": (512.0, 32.0)}
 # What is said of the next three was measured on `asymmetry`, `double-peak` and 10,000 passages: the work they took.
 FIRST = 3.0  # steps per first period, with which pilots begin: no rung of fewer has held 1e-2; 1 to 6 chose alike
 FLAT = 1.2  # times what a column leaves, from where finer rungs gain nothing: 1.05 to 1.5 chose alike

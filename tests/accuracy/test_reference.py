@@ -132,25 +132,25 @@ def test_levels_end_where_nothing_changes_any_more() -> None:
 
 
 def test_what_is_within_the_tolerance_is_not_marched_again_for_seconds() -> None:
-    """A slow shuttle of 420 kg, told that its next level is dear."""
+    """A slow shuttle of 340 kg, to whose few modes eight add by chance what they then take back; such a level is called
+    dear here."""
     given = engine.load(catalogue.find_study("double-peak")).with_values(
         {
             "sweep": {},
-            "carriage.table.motion.frequency": 0.025,
+            "carriage.table.motion.frequency": 0.0343,
             "carriage.table.motion.cycles": 16,
-            "carriage.table.mass": 420,
+            "carriage.table.mass": 340,
             "body.bed.damping_ratio": 0.02,
-            "solver.tolerance": 3e-4,
         }
     )
     grid = only_grid(given)
     found = converge(Marches(grid, grid.values, in_full(grid)), REFERENCE_PART, Beyond(0, 1e6))
     closer = converge(Marches(grid, grid.values, in_full(grid)), REFERENCE_PART, Beyond(0, math.inf))
-    assert found.settled.all() and closer.settled.all() and closer.level[0] > found.level[0]
+    assert found.settled.all() and closer.settled.all() and closer.level[0] == found.level[0] + 1
     held = np.isfinite(tolerances(results_of(grid.asked)))
     model = grid.model(in_full(grid).numerics[closer.level[0]])
     off = differences(grid.asked, model, grid.values, found.outcome, closer.outcome)[held]
-    assert DOUBTED * 3e-4 < found.error[held].max() <= 3e-4
+    assert DOUBTED * 1e-3 < found.error[held].max() <= 1e-3
     assert np.all(off <= found.error[held])
 
 
@@ -311,7 +311,7 @@ def test_errors_of_what_a_head_beside_the_axis_pushes_are_told() -> None:
         plan = make_plan(given.with_values({"sweep": sweep, "solver.tolerance": wanted}))
         found = audit(plan, np.arange(plan.size))
         tolerance = tolerances(results_of(plan.asked))[:, None]
-        matters = (found.observed > 0.01 * tolerance) & (found.observed > 0.5 * found.doubt)
+        matters = (found.observed > 0.01 * tolerance) & (found.observed > found.doubt)
         told = np.append(told, found.told[matters])
         observed = np.append(observed, found.observed[matters])
     assert observed.size > 10

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import studies
-from engine.accuracy.grids import SWIFT
+from engine.accuracy.grids import SCALED_FOX_GOODWIN
 from engine.accuracy.reference import in_full
 from engine.scene.study import Study
 from results_schema.status import Status
@@ -41,7 +41,7 @@ def riding(stub: float, sensors: dict[str, Any], bed: dict[str, Any] = FREE, **c
 
 def test_what_swings_a_hundred_times_as_fast_as_all_else_takes_mass() -> None:
     given = riding(0.01, {"place": fixed(0.5)} | FORCE)
-    assert in_full(only_grid(given)).numerics[0].scheme == SWIFT
+    assert in_full(only_grid(given)).numerics[0].scheme == SCALED_FOX_GOODWIN
     found = studies.run(given)
     assert found.status == Status.OK and float(found.error_estimate) <= 1e-3
     more = {"steps": 20_000, "scheme": "average-acceleration"}

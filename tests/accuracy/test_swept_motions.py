@@ -7,7 +7,7 @@ import pytest
 
 import engine
 from engine.accuracy.choice import MOST_SCENES, coordinates, pilots_of
-from engine.accuracy.grids import SWIFT, open_scheme
+from engine.accuracy.grids import SCALED_FOX_GOODWIN, open_scheme
 from engine.accuracy.ladder import ladder_of
 from engine.accuracy.results import results_of
 from engine.batch.audit import audit
@@ -78,7 +78,7 @@ def test_scenes_of_which_some_may_not_be_marched_swiftly_share_a_ladder() -> Non
     sprung = oscillator(0.3, 30.0, cruise(0.0, 1.0, 1.0, after=2.0), wheel_mass=0.05)
     beds = {"bed": {"of": "body.bed.length", "from": 1.0, "to": 5.6, "spacing": "log", "count": FEW_SCENES + 2}}
     plan = chosen_plan(study(beam(modes="auto"), sprung, solver={"tolerance": TOLERANCE}, sweep=beds))
-    fits = [open_scheme(grid) is SWIFT for grid in plan.grids]
+    fits = [open_scheme(grid) is SCALED_FOX_GOODWIN for grid in plan.grids]
     assert 10 < sum(fits) < len(fits) - 10
     (ladder,) = {ladder_of(plan.asked, grid).columns for grid in plan.grids}
     assert {column.scheme.name for column in ladder} == {"average-acceleration"}

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 import engine
-from engine.accuracy.grids import AVERAGE_ACCELERATION, SWIFT, SceneGrid
+from engine.accuracy.grids import AVERAGE_ACCELERATION, SCALED_FOX_GOODWIN, SceneGrid
 from engine.accuracy.results import differences, results_of, worst_held
 from engine.batch.plan import Plan
 from engine.kernels.schemes import SCHEMES as EVERY
@@ -28,9 +28,9 @@ from tests.engine.build import steel
 
 MODES = (2, 3, 4, 6, 8, 10, 12, 16, 20, 24, 32, 48, 64)
 CUTS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)  # steps in one of the grid's
-REFERENCE = Numerics("full", SWIFT, True, 64), 2048  # 65,536 steps over a passage
+REFERENCE = Numerics("full", SCALED_FOX_GOODWIN, True, 64), 2048  # 65,536 steps over a passage
 #: The last one as studies take it now, the others as they did before.
-SCHEMES = AVERAGE_ACCELERATION, EVERY["fox-goodwin"]({}), SWIFT
+SCHEMES = AVERAGE_ACCELERATION, EVERY["fox-goodwin"]({}), SCALED_FOX_GOODWIN
 BED = steel(15.0, damping_ratio=0.02)
 
 

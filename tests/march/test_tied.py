@@ -77,6 +77,10 @@ SCENES: dict[str, Callable[[], Study]] = {
     ),
     "own weight, equilibrium": lambda: case(beam(own_weight=True), car(shuttle(0.2, 0.9, 0.8, 0.0, 1), **FULL)),
     "linear acceleration": lambda: case(beam(), ONE, **scheme("linear-acceleration")),
+    "scaled Fox-Goodwin": lambda: case(beam(modes=6, damping_ratio=0.02), ONE, **scheme("scaled-fox-goodwin")),
+    "scaled Fox-Goodwin, turning": lambda: case(
+        beam(supports=SPRINGS, modes=6), car(shuttle(0.8, 0.1, 1.0, 0.0, 1), **FULL), **scheme("scaled-fox-goodwin")
+    ),
     "HHT-alpha": lambda: case(beam(), ONE, **scheme("hht-alpha", alpha=-0.1)),
     "generalized-alpha, turning": lambda: case(
         beam(supports=DAMPED),

@@ -155,6 +155,9 @@ SCENES: dict[str, Callable[[], Study]] = {
         {"car": mass(0.5, cruise(-0.2, 1.3, 0.8)), "next": mass(0.4, cruise(1.2, 0.0, 1.03))},
         **scheme("scaled-fox-goodwin"),
     ),
+    "scaled Fox-Goodwin, turning": lambda: case(
+        beam(damping_ratio=0.02), mass(0.5, shuttle(0.3, 0.8, 1.0, 0.0, 2)), steps=40, **scheme("scaled-fox-goodwin")
+    ),
     "central difference": lambda: case(beam(), HALF, steps=200, **scheme("central-difference")),
     "damped Newmark, turning": lambda: case(
         beam(supports=DAMPED), mass(0.5, shuttle(0.3, 0.8, 1.0, 0.0, 1)), **scheme("newmark", beta=0.4, gamma=0.7)

@@ -137,10 +137,12 @@ def velocity_at_kink(scene: Scene, scheme: Newmark | GeneralizedAlpha, t: float,
     for load in scene.loads:
         for sign, phase in ((1.0, load.phase(t, "right")), (-1.0, None if first else load.phase(t, "left"))):
             if phase is not None:
-                rate += sign * load.weight * phase.ds(t) * scene.phi(phase.s(t), 1)
-    seen = np.minimum(scene.omega * h, scheme.scaled_from)
-    slower = seen / (scene.omega * h)
-    return np.asarray(rate / scene.omega**2 * (1.0 - slower * np.sqrt(1.0 - seen**2 / 6.0)))
+                weight = load.weight + (0.0 if load.sprung is None else load.sprung.weight)
+                rate += sign * weight * phase.ds(t) * scene.phi(phase.s(t), 1)
+    omega = np.where(scene.omega > 0.0, scene.omega, 1.0)  # sprung masses feel no rate
+    seen = np.minimum(omega * h, scheme.scaled_from)
+    slower = seen / (omega * h)
+    return np.asarray(rate / omega**2 * (1.0 - slower * np.sqrt(1.0 - seen**2 / 6.0)))
 
 
 def _weights(scheme: Newmark | GeneralizedAlpha) -> tuple[float, float, float, float]:

@@ -14,7 +14,7 @@ from engine.kernels.robots.dynamics import backward, evaluate, factorise, forwar
 from engine.kernels.robots.layout import BEFORE, CHANGE, FALLS_OVER, LIKELY, SOFT
 
 MOST_SETTLING = 200  # corrections
-SWIFT = 0.25  # of its elastic energy before: what a correction may be to leave Newton's method aside
+SCALED_FOX_GOODWIN = 0.25  # of its elastic energy before: what a correction may be to leave Newton's method aside
 #: m or rad by which coordinates are moved for differences, and that a joint goes at most by one correction.
 MOVED_BY, FARTHEST = 1e-4, 0.1
 HEAVY = 0.25  # of a spring's stiffness: that of the weight from which on all of it is looked at
@@ -51,7 +51,7 @@ def by_springs(system, close, state, work, left):
             largest = max(largest, state[k, 0] ** 2 * system.springs[k, 0])
         if change <= close * largest:
             return True
-        if not change <= SWIFT * before:
+        if not change <= SCALED_FOX_GOODWIN * before:
             return False
         before = change
     return False
