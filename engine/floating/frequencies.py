@@ -1,4 +1,4 @@
-"""Natural frequencies of everything together as it stands at time 0: joints that are driven hold, the others turn and
+"""Natural vibrations of everything together as it stands at time 0: joints that are driven hold, the others turn and
 slide on their springs; without gravity and turning, which stiffen or soften little of what is meant to stand.
 
 Particles of all bodies move by small motions q with displacements J q, so that M = sum of m J' J, and K has the modes'
@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from engine.floating.model import FloatingModel
 
 
+RIGID = 1e-6  # of the highest frequency: what is lower is held by nothing, and rounding
+
+
 class Placed(NamedTuple):
     """A frame at time 0: attitude (3, 3), columns its axes; place (3,) m; moves, turns (3, N) of its origin by small
     motions, over the ground."""
@@ -39,9 +42,17 @@ class Placed(NamedTuple):
         return np.asarray(self.moves + turned + self.attitude @ own)
 
 
-def natural_omega(model: FloatingModel) -> Array | None:
-    """(N,) rad/s, ascending, 0 of what nothing holds, of a scene's own numbers; None where joints turn freely in all
-    directions or about what has no inertia, springs are between places, or a carriage slides or has a suspension."""
+class Vibrations(NamedTuple):
+    """omega (N,) rad/s, ascending, 0 of what nothing holds, and damping_ratio (N,), NaN there."""
+
+    omega: Array
+    damping_ratio: Array
+
+
+def natural_vibrations(model: FloatingModel) -> Vibrations | None:
+    """Of a scene's own numbers; None where joints turn freely in all directions or about what has no inertia, springs
+    are between places, or a carriage slides or has a suspension. Damping by what it takes of each vibration, which is
+    that of light damping."""
     joints = [joint for joint in model.joints if joint.coordinate >= 0]
     if model.links or model.places or model.springs or any(j.kind not in (REVOLUTE, PRISMATIC) for j in joints):
         return None
@@ -62,8 +73,24 @@ def natural_omega(model: FloatingModel) -> Array | None:
         unit_mass = np.linalg.inv(np.linalg.cholesky(mass))
     except np.linalg.LinAlgError:
         return None
-    omega_squared = np.linalg.eigvalsh(unit_mass @ (stiffness[:, None] * unit_mass.T))
-    return np.asarray(np.sqrt(np.maximum(omega_squared, 0.0)))
+    squares, turned = np.linalg.eigh(unit_mass @ (stiffness[:, None] * unit_mass.T))
+    omega, shapes = np.sqrt(np.maximum(squares, 0.0)), unit_mass.T @ turned
+    held = omega > RIGID * omega.max(initial=0.0)
+    taken = _damping(model) @ shapes**2
+    return Vibrations(omega, np.where(held, 0.5 * taken / np.where(held, omega, 1.0), np.nan))
+
+
+def _damping(model: FloatingModel) -> Array:
+    """(N,) of each coordinate, of modes 2 zeta omega."""
+    values, found = VariantValues(model.study, {}, 1), np.zeros(model.size)
+    for name, body in model.bodies.items():
+        if body.omega.size:
+            found[_modes(model, name)] = values.damping_rates(name, body.omega)[:, 0]
+    for joint in model.joints:
+        if joint.coordinate >= 0:
+            assert isinstance(joint.spec, AxisJoint)
+            found[joint.coordinate] = joint.spec.damping
+    return found
 
 
 def _modes(model: FloatingModel, name: str) -> slice:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from engine.floating.frequencies import natural_omega
+from engine.floating.frequencies import RIGID, natural_vibrations
 from engine.march.settling import STILL, change_within, names_of_times, parts_of_bands, split, told_part
 from results_schema.arrays import Array
 from results_schema.quantities import AFTER_STOP
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from engine.floating.march import Marched
     from engine.floating.model import FloatingModel
 
-RIGID = 1e-6  # of the highest frequency: what is lower is held by nothing, and rounding
 SWINGS = 2.0  # longest periods before the end, in which nothing may leave a band: a variant's own may be longer
 
 
@@ -65,8 +64,8 @@ def settled(model: FloatingModel, marched: Marched) -> Settled:
 def longest_period(model: FloatingModel) -> float:
     """Of the natural vibrations of the study's own scene as it stands at time 0, s; where these are not known, of
     bodies."""
-    omega = natural_omega(model)
-    swings = [] if omega is None else omega[omega > RIGID * omega.max(initial=0.0)]
+    found = natural_vibrations(model)
+    swings = [] if found is None else found.omega[found.omega > RIGID * found.omega.max(initial=0.0)]
     return 2.0 * np.pi / float(min(swings, default=model.first_omega))
 
 

@@ -137,14 +137,16 @@ def _row(part: xr.Dataset, held: Mask) -> tuple[str, ...]:
 def together(study: Study) -> Iterator[TextTable]:
     """The lowest natural frequencies of all bodies and carriages of a scene together, where these say more than those
     of each body."""
-    from engine.floating.frequencies import natural_omega
+    from engine.floating.frequencies import natural_vibrations
     from engine.floating.model import build
 
     if len(study.body) + len(study.carriage) < 2:
         return
-    omega = natural_omega(build(study.without_sweep(), MODES_TOGETHER))
-    if omega is not None:
-        frequencies = [number(float(one) / (2.0 * np.pi)) for one in omega[:SHOWN]]
-        more = " ..." if omega.size > SHOWN else ""
+    found = natural_vibrations(build(study.without_sweep(), MODES_TOGETHER))
+    if found is not None:
+        frequencies = [number(float(one) / (2.0 * np.pi)) for one in found.omega[:SHOWN]]
+        ratios = [number(float(one), 2) for one in found.damping_ratio[:SHOWN]]
+        more = " ..." if found.omega.size > SHOWN else ""
         title = "All together at time 0, driven joints held, without gravity"
-        yield TextTable(title, ("frequencies (Hz)",), [(", ".join(frequencies) + more,)])
+        row = tuple(", ".join(one) + more for one in (frequencies, ratios))
+        yield TextTable(title, ("frequencies (Hz)", "damping ratios"), [row])

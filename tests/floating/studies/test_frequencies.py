@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from engine.floating.frequencies import natural_omega
-from engine.floating.model import build
+from engine.floating.frequencies import natural_vibrations
+from engine.floating.model import FloatingModel, build
 from engine.scene.study import Study
 from studies.kinds.moving_frames import KIND
 from tests.floating.scenes import ARM, FLYER, history, steps
@@ -21,6 +21,11 @@ def arm(joint: dict[str, Any], bodies: dict[str, Any], frames: dict[str, Any], *
     """An arm that hangs on a joint, and what hangs on it."""
     given = {"body": {"arm": ARM} | bodies, "frame": {"arm": {"joints": [joint]}} | frames, "gravity": 0.0}
     return Study(kind="moving-frames", question={"duration": 1.0}, **(given | tables))
+
+
+def natural_omega(model: FloatingModel) -> np.ndarray | None:
+    found = natural_vibrations(model)
+    return None if found is None else found.omega
 
 
 def point(mass: float) -> dict[str, Any]:
@@ -103,3 +108,29 @@ def test_check_shows_them_where_they_say_more_than_each_body() -> None:
     omega = natural_omega(build(arm(TURN, {"tool": point(15.0)}, {"tool": {"on": "arm"}})))
     assert omega is not None and table.title.startswith("All together at time 0")
     assert table.rows[0][0].startswith(f"{omega[0] / (2.0 * np.pi):.3g}, {omega[1] / (2.0 * np.pi):.3g}, ")
+
+
+def test_damping_of_all_together_is_what_a_march_loses() -> None:
+    """A point of twice an arm's mass at its end, which takes most of the swing and has no damping; by how much smaller
+    peaks are sixteen periods later."""
+    bodies = {"arm": ARM | {"damping_ratio": 0.02}, "tool": point(24.0)}
+    still = TURN | {"motion": {"kind": "waypoints", "times": [0, 2.0], "values": [0.0, 1e-6]}}
+    study = arm(still, bodies, {"tool": {"on": "arm"}}, sensor={"tip": {"body": "arm", "at": 10.0}})
+    found = natural_vibrations(build(study))
+    assert found is not None
+    omega, ratio = float(found.omega[0]), float(found.damping_ratio[0])
+    assert ratio < 0.5 * 0.02
+    period = 2.0 * np.pi / omega
+    model, marched = steps(study, 20.0 * period, 20_000)
+    signal = np.abs(history(model, marched, "sensors")[:, 0])
+    assert 3.0 * period > 2.0
+    peaks = signal[3_000:4_000].max(), signal[19_000:20_000].max()
+    assert np.log(peaks[0] / peaks[1]) == pytest.approx(16.0 * 2.0 * np.pi * ratio, rel=0.02)
+
+
+def test_damping_of_a_joint_counts_with_that_of_modes() -> None:
+    """Of a rod about its end on a soft spring: c/(2 omega I)."""
+    found = natural_vibrations(build(arm(HINGE | {"damping": 0.5}, {}, {})))
+    assert found is not None
+    inertia = ARM["density"] * ARM["area"] * ARM["length"] ** 3 / 3.0
+    assert found.damping_ratio[0] == pytest.approx(0.5 / (2.0 * np.sqrt(9.0 * inertia)), rel=0.02)
