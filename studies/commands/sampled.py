@@ -15,7 +15,7 @@ from studies.protocol.stopping import AskedElsewhere
 if TYPE_CHECKING:
     from studies.protocol.parts import Piece
 
-SECONDS = 3.0  # that measuring may take, as far as pieces say beforehand how long they are
+SECONDS = 2.0  # that measuring may take, as far as pieces say beforehand how long they are
 PATIENCE = 10.0  # the same of pieces that take longer than they say
 
 

@@ -46,7 +46,7 @@ class Stability(PiecedKind):
     def pieces(self, study: Study) -> Sequence[Piece]:
         asked, ground = question_of(study, Asked), Ground(study)
         chosen = [one for name, one in MAPS.items() if name in asked.maps]
-        return [Piece(one.name, one.words, partial(one.compute, ground, asked), one.seconds) for one in chosen]
+        return [Piece(one.name, one.words, partial(one.compute, ground, asked), one.seconds(asked)) for one in chosen]
 
     def gather(self, pieces: Mapping[str, xr.Dataset], study: Study) -> xr.Dataset:
         modes, steps = (

@@ -126,4 +126,10 @@ def _enough(above: xr.DataArray, far: xr.DataArray) -> str:
     )
 
 
-MAP = Map("alias", "growth per passage over steps, speed, mass and modes", 14.0, OUTPUTS, compute, sentences)
+def _seconds(asked: Asked) -> float:
+    """Expected: steps of the rule go with the frequency of the highest mode and the time of a passage."""
+    steps = sum(modes**2 for modes in asked.alias_mode_counts) * sum(1.0 / speed for speed in asked.speed_ratios)
+    return 1.3e-4 * asked.fineness * steps
+
+
+MAP = Map("alias", "growth per passage over steps, speed, mass and modes", _seconds, OUTPUTS, compute, sentences)

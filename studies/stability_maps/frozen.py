@@ -166,4 +166,11 @@ def _passages(growth: Array) -> str:
     return f"Real passages grow there too: {where}, all do, {low} to {high} times per passage."
 
 
-MAP = Map("frozen", "the frozen station beside the real passage", 4.0, OUTPUTS, compute, sentences)
+MAP = Map(
+    "frozen",
+    "the frozen station beside the real passage",
+    lambda asked: 0.45 * asked.fineness,
+    OUTPUTS,
+    compute,
+    sentences,
+)

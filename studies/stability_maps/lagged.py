@@ -76,4 +76,11 @@ def sentences(dataset: xr.Dataset) -> list[str]:
     ]
 
 
-MAP = Map("lagged-inertia", "lagged inertia over mass, modes and step", 4.0, OUTPUTS, compute, sentences)
+MAP = Map(
+    "lagged-inertia",
+    "lagged inertia over mass, modes and step",
+    lambda asked: 0.9 * asked.fineness,
+    OUTPUTS,
+    compute,
+    sentences,
+)

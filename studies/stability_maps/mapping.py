@@ -50,13 +50,14 @@ class Asked(Spec):
 class Map:
     """One map.
 
-    name: as in the study file. words: what it does. seconds: expected. outputs: what its dataset holds, besides the
-    axes that several kinds of study have. compute: the dataset. sentences: what it says, from its own dataset.
+    name: as in the study file. words: what it does. seconds: expected, as two fast cores took. outputs: what its
+    dataset holds, besides the axes that several kinds of study have. compute: the dataset. sentences: what it says,
+    from its own dataset.
     """
 
     name: str
     words: str
-    seconds: float
+    seconds: Callable[[Asked], float]
     outputs: tuple[Variable, ...]
     compute: Callable[[Ground, Asked, Work], xr.Dataset]
     sentences: Callable[[xr.Dataset], list[str]]

@@ -73,4 +73,11 @@ def _beyond(values: xr.DataArray) -> str:
     return listed(high) if high else f"no scheme goes beyond {number(NOTABLE)} times"
 
 
-MAP = Map("overshoot", "how far schemes overshoot in their first steps", 2.0, OUTPUTS, compute, sentences)
+MAP = Map(
+    "overshoot",
+    "how far schemes overshoot in their first steps",
+    lambda asked: 0.17 * asked.fineness,
+    OUTPUTS,
+    compute,
+    sentences,
+)

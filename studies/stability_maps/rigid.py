@@ -102,4 +102,4 @@ def _calms(calm: list[str]) -> str:
     return told + (f"{listed(others)} {'does' if len(others) == 1 else 'do'} not ring either; " if others else "")
 
 
-MAP = Map("rigid-tie", "the contact force of a mass tied by its place", 2.0, OUTPUTS, compute, sentences)
+MAP = Map("rigid-tie", "the contact force of a mass tied by its place", lambda asked: 0.06, OUTPUTS, compute, sentences)

@@ -76,4 +76,6 @@ def sentences(dataset: xr.Dataset) -> list[str]:
     ]
 
 
-MAP = Map("schemes", "growth of every scheme over the step, and its limit", 4.0, OUTPUTS, compute, sentences)
+MAP = Map(
+    "schemes", "growth of every scheme over the step, and its limit", lambda asked: 0.14, OUTPUTS, compute, sentences
+)

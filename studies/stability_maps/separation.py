@@ -109,4 +109,11 @@ def sentences(dataset: xr.Dataset) -> list[str]:
     ]
 
 
-MAP = Map("separation", "where a crossing mass would lift off", 2.0, OUTPUTS, compute, sentences)
+MAP = Map(
+    "separation",
+    "where a crossing mass would lift off",
+    lambda asked: 0.03 * len(asked.mass_ratios),
+    OUTPUTS,
+    compute,
+    sentences,
+)

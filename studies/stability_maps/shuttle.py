@@ -153,4 +153,11 @@ def _main(dataset: xr.Dataset) -> str:
     )
 
 
-MAP = Map("shuttle", "Floquet multipliers of a swinging mass", 3.0, OUTPUTS, compute, sentences)
+MAP = Map(
+    "shuttle",
+    "Floquet multipliers of a swinging mass",
+    lambda asked: 0.6 * asked.fineness**2,
+    OUTPUTS,
+    compute,
+    sentences,
+)
