@@ -37,9 +37,9 @@ FEWER, LEAST_LEVELS = (2, 1), 3  # the same where 64 modes hold few of them, and
 PILOT_PLACES = 9  # of an envelope, at which its error is measured: a mode or two lie between them at 1e-3
 MOST_COMPARED = 4096  # stations of the histories that are compared: 0.25 MB of 8 variants each signal
 KEPT_CYCLE = 256 * 2**20  # of a cycle's tables: ten of 64 modes x 102,400 steps took 2.1 s, 3.1 s with 96 MB
-#: Steps per first period, with which average acceleration is 5e-5 off in phase. It could be 20,000: up to there sweeps
-#: of a sprung mass took a third of its work by the other scheme; at 230,000 some references have no estimate.
-CLOSE_STEPS = 320
+#: Steps per first period, up to which sweeps of a sprung mass on stiff springs took a third of the work that average
+#: acceleration took; at ten times as many 9 of 192 references have no estimate.
+CLOSE_STEPS = 20_000
 LEAST_FREE = 8  # steps per first period of free vibration: what the coarsest march of such passages had
 
 
@@ -196,7 +196,7 @@ def unit_steps(scene: SceneModel) -> int:
 def open_scheme(grid: SceneGrid) -> Scheme:
     """The scheme of a study that leaves it open: Fox-Goodwin's, whose fast modes take mass; average acceleration, which
     has no limit, where springs are stiff: beside modes in free vibration, or so that their limit asks for more steps
-    than average acceleration takes to be close."""
+    than it is worth."""
     if not grid.scene.springs:
         return SCALED_FOX_GOODWIN
     fewest = grid.mode_levels[0] if open_bodies(grid.scene.study) else 0
