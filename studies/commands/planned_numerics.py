@@ -105,7 +105,7 @@ def _errors(plan: Plan, parts: Sequence[Part]) -> tuple[str, str]:
     unknown = sum(int((~np.isfinite(part.error)).any(axis=0).sum()) for part in parts)
     found = worst(plan, parts)
     if found is None:
-        return ("unknown", "") if held_results(plan) else ("only told", "nothing")
+        return ("unknown", "") if held_results(plan) else ("only estimated", "nothing")
     more = f", {unknown:,} unknown" if unknown else ""
     return scientific(found.error) + more, scientific(found.asked)
 

@@ -209,7 +209,7 @@ def told_loosely(found: Sequence[Range], occurring: Container[Status]) -> list[s
     if not loose:
         return []
     ringing = next((one.name.removesuffix(RESIDUAL) for one in loose if one.name.endswith(RESIDUAL)), "")
-    closer = f" Residual vibrations are told closer by a smaller tolerance (sensor.{ringing}.tolerance)."
+    closer = f" Residual vibrations are known more closely with a smaller tolerance (sensor.{ringing}.tolerance)."
     words = ", ".join(f"{_name(one)} {one.said(one.extreme)}" for one in loose)
     helps = ringing and Status.TOLERANCE_MISSED not in occurring
     return [f"Told errors of more than a tenth of the value: {words}.{closer if helps else ''}"]

@@ -194,9 +194,7 @@ def _by_modes(results: Results) -> list[Figure]:
         return []
     off, doubt = (float(results.dataset[f"error_by_modes{end}"].max()) for end in ("", "_doubt"))
     title = f"Too few modes of every rail change errors of tools by up to {percent(off)}"
-    caption = (
-        f"Beside as many as the tolerance asks for, with which errors are told to be off by {percent(doubt)} at most."
-    )
+    caption = f"Beside as many as the tolerance asks for, with which errors are estimated to within {percent(doubt)}."
     return [draw("modes", title, caption, 3.0, partial(_draw_modes, results))]
 
 

@@ -86,7 +86,7 @@ def sentences(dataset: xr.Dataset) -> list[str]:
     quiet = truth <= STEADY
     many = f"{number(float(multiple.max()))} times the rule's steps"
     if not quiet.any():
-        return [f"Too few steps: in all {quiet.size} scenes some vibration grows with {many} too, so nothing is told."]
+        return [f"Too few steps: in all {quiet.size} scenes some vibration grows with {many} too: no answer."]
     average, damped = ((growth.isel(alias_scheme=i, drop=True) / truth).where(quiet) for i in (0, 1))
     few = (multiple >= FEW[0] - 1e-9) & (multiple <= FEW[1] + 1e-9)
     cure = float(damped.where(few).max())

@@ -169,7 +169,7 @@ def test_a_missed_tolerance_names_its_result() -> None:
     assert missed_most(Results.of(dataset)) == " (most of all for midspan_max: 3e-2 where 1e-3 was asked)"
     error[:, results.index("midspan")] = [np.nan, 0.05, 0.0, 0.5]
     assert missed_most(Results.of(dataset)) == " (most of all for the history of midspan: 5e-2 where 1e-3 was asked)"
-    helps = "on the sensors midspan and moment, so that errors are told and not held, or a larger tolerance."
+    helps = "on the sensors midspan and moment, so that errors are estimated and not held, or a larger tolerance."
     assert answers.answer(dataset)[-3].endswith(
         f'2 tolerance-missed (values kept). What helps: `tolerance = "told"` {helps}'
     )

@@ -219,8 +219,10 @@ def test_the_lines_at_the_end_say_which_variants_they_are_of(fine: Outcome, caps
     assert told_accuracy(fine.audit, Results.of(results)).startswith("estimated errors of those that are ok at most ")
     show_outcome(replace(fine, results=results))
     told = " ".join(capsys.readouterr().out.split())
-    helps = 'What helps: `tolerance = "told"` on the sensor midspan, so that errors are told and not held, or a larger'
-    assert "most of all for midspan_max: 9e-1 where" in told and f"was asked). {helps} tolerance. Accuracy: " in told
+    helps = 'helps: `tolerance = "told"` on the sensor midspan, so that errors are estimated and not held, or a larger'
+    assert (
+        "most of all for midspan_max: 9e-1 where" in told and f"was asked). What {helps} tolerance. Accuracy: " in told
+    )
 
 
 def test_errors_within_several_tolerances_are_said_to_be_within_their_own(fine: Outcome) -> None:
