@@ -139,6 +139,6 @@ def told_unsettled(results: Results) -> list[str]:
     advice = f"{np.ceil(enough):,.0f} cycles would be enough" if known else "more cycles, or damping, help"
     told = f"of the start's vibration is left in the last cycle{where_late(results, late)}"
     return [
-        f"In {int(late.sum()):,} of {counted(results.size, 'variant')} more than {percent(held)} {told}: what is told "
-        f"holds the start too, at most {percent(most)} of it; {advice}."
+        f"In {int(late.sum()):,} of {counted(results.size, 'variant')} more than {percent(held)} {told}: what is "
+        f"said of these includes it, at most {percent(most)} of it; {advice}."
     ]
