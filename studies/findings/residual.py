@@ -72,6 +72,16 @@ class Times(NamedTuple):
         return cls(values.max(axis=0), np.take_along_axis(errors, last, axis=0)[0])
 
 
+def crosses(results: Results) -> bool:
+    """Whether all carriages leave their bodies, so that there is no stop."""
+    return all(carriage.motion.passes for carriage in results.study.carriage.values())
+
+
+def since(results: Results) -> str:
+    """What what swings on is told after."""
+    return "the last carriage has left" if crosses(results) else "the stop"
+
+
 def settle_together(results: Results) -> list[str]:
     """Sensors with a time of move and settling, where motions differ in these; none where that is one's alone."""
     found = [name for name in banded(results) if moves_differ(results, name) and not has_whole(results, name)]
@@ -85,6 +95,8 @@ def banded(results: Results) -> list[str]:
 
 def moves_differ(results: Results, sensor: str) -> bool:
     """Whether variants come to rest at different times, so that the shortest settling is not the shortest time."""
+    if crosses(results):
+        return False
     settling, whole = (settling_of(results, name) for name in names_of_times(sensor))
     stops = (whole - settling)[np.isfinite(whole)]
     return bool(stops.size > 1 and np.ptp(stops) > ROUNDING * stops.max())
@@ -172,11 +184,11 @@ def _residual(results: Results, sensor: str, asked: AskedOfRest) -> str:
         return f"{sensor}: no variant has a residual vibration."
     size = float(values[place])
     if quiet(results, sensor):
-        return f"{sensor}: at rest it does not swing."
+        return f"{sensor}: after {since(results)} it does not swing."
     doubt = absolute_errors(results, f"{sensor}_residual")
     error = float(doubt[place])  # parts of a static value mislead here
     said = (
-        f"{sensor}: at rest it still swings by up to {quantity(size, units)}"
+        f"{sensor}: after {since(results)} it still swings by up to {quantity(size, units)}"
         f"{told_error(error, size, units)}{in_words(results, place)}"
     )
     axis = next(iter(by_effect(results, values)), None)
@@ -223,11 +235,12 @@ def told_settling(results: Results, sensor: str, limit: float | None, axis: Axis
     known = int(np.count_nonzero(np.isfinite(values)))
     within = f"within {quantity(band, units)} of its static value"
     among = f"in {known:,} of {counted(known + left, 'variant')} " if left else ""
+    at = f"when {since(results)}" if crosses(results) else since(results)
     if place is not None and float(values[place]) == 0.0:
-        said.append(f"{among}it is {within} from the stop on")
+        said.append(f"{among}it is {within} from {at} on")
     elif place is not None:
         took, error = float(values[place]), float(absolute_errors(results, names_of_times(sensor)[0])[place])
-        when = f"{quantity(took, 's')}{told_error(error, took, 's')} after the stop at the latest"
+        when = f"{quantity(took, 's')}{told_error(error, took, 's')} after {since(results)} at the latest"
         said.append(f"{among}it has settled {within} {when}{in_words(results, place)}")
     if limit is not None:
         longer = where_beyond(results, np.where(np.isnan(values), np.inf, values), limit, axis)

@@ -42,7 +42,7 @@ from studies.findings.effects import (
 )
 from studies.findings.envelopes import beyond_sensors, sizes_along, told_along
 from studies.findings.in_step import told_between_speeds, told_in_step
-from studies.findings.residual import asks_of_rest, check_residual, most_ringing, residuals
+from studies.findings.residual import asks_of_rest, check_residual, crosses, most_ringing, residuals
 from studies.protocol.study import Kind, question_of
 from studies.results.axes import PACES, VARIANT
 from studies.results.findings_common import (
@@ -109,6 +109,8 @@ class Passage(Kind):
         lifted, kept = told_contacts(results)
         asked = question_of(results.study, AskedOfPassages)
         residual, low = residuals(results, asked), told_low_contacts(results, asked.least_contact)
+        if crosses(results):  # what swings on then is beside the question
+            return [*said[:1], *residual[:1], *low, *lifted, *said[1:], *residual[1:], *kept, *told_statuses(results)]
         both = [*residual[:1], *said[:1]] if asks_of_rest(results.study, asked) else [*said[:1], *residual[:1]]
         return [*both, *low, *lifted, *residual[1:], *said[1:], *kept, *told_statuses(results)]
 

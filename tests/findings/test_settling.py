@@ -12,7 +12,7 @@ from studies.reporting import answers
 from studies.reporting.summary import in_tables
 from studies.results.formatting import listed
 from studies.results.results import Results
-from tests.engine.build import beam, force, study
+from tests.engine.build import beam, cruise, fixed, force, study
 from tests.kinds.test_residual import MOVE, STEPS, SWEPT, stops
 
 
@@ -53,7 +53,7 @@ def test_the_best_motion_is_told_for_each_mass_and_way_at_the_worst_damping() ->
     found["midspan_move_and_settle_time"] = times.copy(data=known)
     found["midspan_settling_time"] = times.copy(data=0.5 * known)
     (said,) = (text for text in answers.answer(found) if text.startswith("Until midspan has settled, "))
-    (swings,) = (text for text in answers.answer(found) if "at rest" in text)
+    (swings,) = (text for text in answers.answer(found) if "after the stop it" in text)
     plain, words = re.sub(r" ± \S+ \S+", "", said), list[str]()
     for way, push in product((1, 0), (0, 1)):  # backward first
         worst = {step: max(known[step, way, push]) for step in range(5) if np.isfinite(known[step, way, push]).all()}
@@ -126,7 +126,7 @@ def test_limits_and_settling_of_a_dynamic_part_are_told(beside: bool) -> None:
     sensors |= {"whole": {"body": "bed", "at": 0.5}} if beside else {}
     asked = {"residual": {"displacement": 1e-3}}
     given = stops(sensor=sensors, output={"residual": True, "histories": "none"}, question=asked)
-    (told,) = (text for text in answers.answer(studies.run(given)) if text.startswith("part: at rest"))
+    (told,) = (text for text in answers.answer(studies.run(given)) if text.startswith("part: after the stop"))
     assert "it exceeds 1 mm" in told and "settled" in told
 
 
@@ -137,6 +137,26 @@ def test_a_dynamic_part_and_its_whole_settle_as_one() -> None:
     told = answers.answer(studies.run(stops(sensor=sensors, output={"residual": True, "histories": "none"})))
     assert not any("have settled" in text for text in told)
     assert sum("move and settling take" in text for text in told) == 1
+
+
+def test_what_swings_on_after_a_crossing_stands_behind_how_far_it_bent() -> None:
+    """Nothing stops then, and the shortest crossing and settling is no question of a bridge."""
+    sensors = {"midspan": fixed(0.5) | {"settling_band": 8e-3}, "quarter": fixed(0.25)}
+    given = study(
+        beam(modes=1, damping_ratio=0.03), force(2.0, cruise(0.0, 1.0, 1.0, after=20.0)), sensor=sensors,
+        sweep={"speed": {"of": "carriage.car.motion.speed", "values": [0.4, 0.7, 1.0]}},
+        output={"residual": True}, solver={"steps": 2000, "tolerance": 0.5},
+    )  # fmt: skip
+    found = studies.run(given)
+    first, swings, other = answers.answer(found)[:3]
+    assert first.startswith("midspan: the largest displacement") and other.startswith("quarter: the largest")
+    times = found.midspan_settling_time.values
+    assert swings.startswith("midspan: after the last carriage has left it still swings by up to ")
+    assert f"{times.max():.3g} s after the last carriage has left at the latest" in re.sub(r" ± \S+ \S+", "", swings)
+    assert np.ptp(found.midspan_move_and_settle_time.values) > 0.0
+    assert not any("move and settling" in text or "the stop" in text for text in answers.answer(found))
+    titles = {one.name: one.title for one in studies.figures(found)}
+    assert titles["settling"].startswith("midspan takes up to ") and "has left" in titles["residual"]
 
 
 def test_errors_of_an_amplification_have_no_unit() -> None:

@@ -41,10 +41,10 @@ def test_it_is_said_where_a_limit_is_exceeded(kind: str) -> None:
     assert np.argmax(sizes) == 1
     limited = studies.run(stops(kind, question={"residual": {"displacement": 17e-3}}))
     np.testing.assert_array_equal(limited.midspan_residual.values, sizes)
-    (said,) = (text for text in answers.answer(limited) if "at rest" in text)
+    (said,) = (text for text in answers.answer(limited) if "after the stop it" in text)
     where = "over acceleration it exceeds 17 mm at 6 to 12 m/s²"
-    assert said.endswith(f"at rest it still swings by up to 19.3 mm at acceleration 6 m/s²; {where}.")
-    (short,) = (text for text in answers.answer(found) if "at rest" in text)
+    assert said.endswith(f"after the stop it still swings by up to 19.3 mm at acceleration 6 m/s²; {where}.")
+    (short,) = (text for text in answers.answer(found) if "after the stop it" in text)
     assert short == said.replace(f"; {where}", "")
 
 
@@ -53,10 +53,10 @@ def test_its_error_stands_beside_it_in_its_own_unit() -> None:
     found = studies.run(stops())
     static = float((found.midspan_max / found.dynamic_amplification.sel(sensor="midspan"))[1])
     found["estimated_error"].loc[{"result": "midspan_residual"}] = 5e-3 / static
-    (said,) = (text for text in answers.answer(found) if "at rest" in text)
+    (said,) = (text for text in answers.answer(found) if "after the stop it" in text)
     assert "up to 19.3 mm ± 5 mm at acceleration 6 m/s²" in said
     found["estimated_error"].loc[{"result": "midspan_residual"}] = 1e-3 / static
-    (said,) = (text for text in answers.answer(found) if "at rest" in text)
+    (said,) = (text for text in answers.answer(found) if "after the stop it" in text)
     assert "up to 19.3 mm at acceleration 6 m/s²" in said
 
 
@@ -67,8 +67,8 @@ def test_the_answer_begins_with_the_time_after_the_stop_where_that_is_asked_for(
     banded = {"midspan": {"body": "bed", "at": 0.5, "settling_band": 8e-3}}
     for asked, first in (
         ({}, "midspan: the largest displacement"),
-        ({"question": LIMIT}, "midspan: at rest it still swings"),
-        ({"sensor": banded}, "midspan: at rest it still swings"),
+        ({"question": LIMIT}, "midspan: after the stop it still swings"),
+        ({"sensor": banded}, "midspan: after the stop it still swings"),
     ):
         assert answers.answer(studies.run(stops(**asked)))[0].startswith(first)
 
@@ -89,7 +89,8 @@ def test_it_is_drawn_with_its_error_and_its_limit(kind: str) -> None:
     told[:] = 1e-3 / (scale + 1e-3 * (kind == "trajectory"))  # over the true largest value, where no statics are known
     figure = drawn(found)["residual"]
     assert figure.title == (
-        "midspan still swings by up to 19.3 mm at rest, beyond the limit of 17 mm, at zeta 0, acceleration 6 m/s²"
+        "midspan still swings by up to 19.3 mm after the stop, beyond the limit of 17 mm, at zeta 0, "
+        "acceleration 6 m/s²"
     )
     (axes,) = figure.drawing.axes
     *curves, limit = axes.lines
@@ -133,7 +134,7 @@ def test_its_title_has_the_number_of_the_archive_and_its_caption_that_stations_a
 def test_sensors_nearest_to_their_limits_or_that_swing_most_come_first(question: dict[str, Any]) -> None:
     sensors = {"quarter": {"body": "bed", "at": 0.25}, "midspan": {"body": "bed", "at": 0.5}}
     found = studies.run(stops(sensor=sensors, question=question))
-    told = [text.partition(":")[0] for text in answers.answer(found) if "at rest" in text]
+    told = [text.partition(":")[0] for text in answers.answer(found) if "after the stop it" in text]
     assert told == ["midspan", "quarter"]
 
 
@@ -146,7 +147,7 @@ def test_the_history_of_the_largest_is_kept() -> None:
 def test_no_variant_beyond_a_limit_is_said_so() -> None:
     twice = SWEPT | {"zeta": {"of": "body.bed.damping_ratio", "values": [0.01, 0.02]}}
     found = studies.run(stops(sweep=twice, question={"residual": {"displacement": 1.0}}))
-    (said,) = (text for text in answers.answer(found) if "at rest" in text)
+    (said,) = (text for text in answers.answer(found) if "after the stop it" in text)
     assert "over acceleration it exceeds 1 m nowhere in the sweep. With the worst of all else that is swept" in said
 
 
@@ -170,7 +171,7 @@ def test_what_leaves_is_said_not_to_be_read_then() -> None:
 def test_what_is_not_asked_is_not_told() -> None:
     found = studies.run(stops(output={"histories": "none"}))
     assert not [name for name in found.variables if "residual" in str(name)]
-    assert not [text for text in answers.answer(found) if "at rest" in text]
+    assert not [text for text in answers.answer(found) if "after the stop" in text]
 
 
 def test_limits_without_results_are_refused() -> None:
@@ -215,7 +216,7 @@ def test_it_is_said_how_long_it_takes_to_settle() -> None:
     ]
     short, long = (one.midspan_settling_time.values for one in closely)
     np.testing.assert_allclose(short[known], long[known], atol=1e-4)
-    (said,) = (text for text in answers.answer(found) if "at rest" in text)
+    (said,) = (text for text in answers.answer(found) if "after the stop it" in text)
     longest, latest = STEPS[int(np.nanargmax(times))], f"{np.nanmax(times):.3g} s after the stop at the latest"
     assert f"it has settled within 8 mm of its static value {latest} at acceleration {longest} m/s²" in said
     left = "2 variants have not settled by the end of the run, over acceleration at 6 to 12 m/s²"
@@ -258,7 +259,7 @@ def test_what_has_not_settled_everywhere_is_not_the_same_everywhere(
     swept = {"acceleration": SWEPT["acceleration"] | {"values": [2, 6]}}
     found = studies.run(stops(sensor=sensors, sweep=swept))
     np.testing.assert_array_equal(found.midspan_settling_time, [0.0, np.nan])
-    (said,) = (text for text in answers.answer(found) if "at rest" in text)
+    (said,) = (text for text in answers.answer(found) if "after the stop it" in text)
     assert said.endswith(
         "; in 1 of 2 variants it is within 17.5 mm of its static value from the stop on; 1 variant has not settled by "
         "the end of the run, over acceleration at 6 m/s²: a longer rest tells when."
@@ -278,7 +279,7 @@ def told_of(sizes: list[float]) -> str:
     steps = {"acceleration": {"of": "carriage.car.motion.acceleration", "values": list(range(2, 2 + len(sizes)))}}
     found = studies.run(stops(sweep=steps))
     found["midspan_residual"][:] = sizes
-    (said,) = (text for text in answers.answer(found) if "at rest" in text)
+    (said,) = (text for text in answers.answer(found) if "after the stop it" in text)
     return said
 
 
@@ -298,7 +299,7 @@ def test_that_values_go_up_and_down_is_said_once() -> None:
     found = studies.run(stops(sweep=steps, sensor={"quarter": fixed(0.25), "midspan": fixed(0.5)}))
     for sensor in ("quarter", "midspan"):
         found[f"{sensor}_residual"][:] = [1e-6, 2e-6, 6.3e-6, 4.6e-6, 7.4e-6, 4.1e-6, 8.2e-6, 6.7e-6]
-    told = [text for text in answers.answer(found) if "at rest it still swings" in text]
+    told = [text for text in answers.answer(found) if "after the stop it still swings" in text]
     assert len(told) == 2 and " ".join(told).count("goes up and down") == 1
 
 
@@ -306,8 +307,8 @@ def test_what_is_left_as_rounding_does_not_swing() -> None:
     """It is told and drawn without a number."""
     found = studies.run(stops(sensor={"quarter": {"body": "bed", "at": 0.25}, "midspan": {"body": "bed", "at": 0.5}}))
     found["quarter_residual"][:] = 1e-10 * float(found["quarter_max"].max())
-    told = [text for text in answers.answer(found) if "at rest" in text]
-    assert "quarter: at rest it does not swing." in told and "midspan: at rest it still swings" in told[0]
+    told = [text for text in answers.answer(found) if "after the stop it" in text]
+    assert "quarter: after the stop it does not swing." in told and "midspan: after the stop it still swings" in told[0]
     figure = drawn(found)["residual"]
     assert len(figure.drawing.axes) == 1 and figure.title.startswith("midspan still swings")
 
@@ -317,7 +318,7 @@ def test_of_samples_a_limit_is_exceeded_in_so_many_variants() -> None:
     swept = {"acceleration": {"of": "carriage.car.motion.acceleration", "from": 2, "to": 30, "sobol": 4}}
     found = studies.run(stops(sweep=swept, question={"residual": {"displacement": 17e-3}}))
     found["midspan_residual"].values[:] = [18e-3, 1e-3, 1e-3, 1e-3]
-    (said,) = (text for text in answers.answer(found) if "at rest" in text)
+    (said,) = (text for text in answers.answer(found) if "after the stop it" in text)
     assert "it exceeds 17 mm in 1 variant of 4." in said
 
 
@@ -350,7 +351,7 @@ def test_it_is_said_where_it_takes_longer_to_settle_than_is_asked(kind: str) -> 
     found = studies.run(given)
     times = found.midspan_settling_time.values
     assert np.isnan(times[-1]) and times[0] < times[1] < 1.5 < times[2] < times[3]
-    (said,) = (text for text in answers.answer(found) if "at rest" in text)
+    (said,) = (text for text in answers.answer(found) if "after the stop it" in text)
     assert "; it takes longer than 1.5 s at 1.5 to 2 and 8 N;" in said
     (figure,) = (one for one in studies.figures(found) if one.name == "settling")
     (axes,) = figure.drawing.axes

@@ -141,12 +141,12 @@ def test_what_swings_on_is_told_of_the_whole_alone() -> None:
     found = studies.run(stop)
     told = " ".join(studies.answer(found))
     assert found.place_part_residual.values == pytest.approx(found.place_residual.values, rel=1e-2)
-    assert "place: at rest it still swings" in told and "place_part: at rest" not in told
+    assert "place: after the stop it still swings" in told and "place_part: after" not in told
     named = [one.name for one in summary.in_tables(Results.of(found))]
     assert "place_residual" in named and "place_part_residual" not in named
     assert "Its absolute value exceeds 3 mm from 4 m/s² to the end of the sweep, 16 m/s²." in told
     alone = studies.run(stop.with_values({"sensor": {"part": fixed(0.5) | {"part": "dynamic"}}}))
-    assert "part: at rest it still swings" in " ".join(studies.answer(alone))
+    assert "part: after the stop it still swings" in " ".join(studies.answer(alone))
 
 
 @pytest.mark.parametrize(

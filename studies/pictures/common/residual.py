@@ -15,7 +15,7 @@ from results_schema.arrays import Array
 from studies.findings.absolute_errors import absolute_errors
 from studies.findings.beyond import AskedOfRest, Limits
 from studies.findings.effects import by_effect
-from studies.findings.residual import MOST_SENSORS, moves_differ, quiet, residual_of, ringing, settling_of
+from studies.findings.residual import MOST_SENSORS, moves_differ, quiet, residual_of, ringing, settling_of, since
 from studies.pictures.common.figures import (
     BLUE,
     Figure,
@@ -82,12 +82,12 @@ def _residuals(results: Results, sensors: list[str], limits: Limits, fewer: int)
     against = ""
     if limit is not None:
         against = f", {'beyond' if size > limit else 'within'} the limit of {quantity(limit, units)}"
-    swings = f"{sensors[0].replace('_', ' ')} still swings by up to {quantity(size, units)} at rest{against}"
+    swings = f"still swings by up to {quantity(size, units)} after {since(results)}"
     caption = (
         "Largest difference from the static value after all carriages have come to rest or left.",
         f"{counted(fewer, 'more sensor')} in the archive." if fewer else "",
     )
-    return _over_sweep(results, "residual", rows, swings, caption)
+    return _over_sweep(results, "residual", rows, f"{sensors[0].replace('_', ' ')} {swings}{against}", caption)
 
 
 def settling(results: Results, sensors: list[str], asked: float | None) -> list[Figure]:
@@ -99,7 +99,8 @@ def settling(results: Results, sensors: list[str], asked: float | None) -> list[
     if not told:
         return []
     with_move = any(moves_differ(results, sensor) for sensor in told)
-    label, since = ("time of move and settling ({})", "beginning") if with_move else ("settling time ({})", "stop")
+    begun = "the beginning" if with_move else since(results)
+    label = "time of move and settling ({})" if with_move else "settling time ({})"
     rows, bands = list[Row](), list[str]()
     for sensor in told:
         name = names_of_times(sensor)[with_move]
@@ -111,7 +112,7 @@ def settling(results: Results, sensors: list[str], asked: float | None) -> list[
         bands.append(f"{sensor.replace('_', ' ')} {quantity(float(known[sensor].settling_band or 0.0), 'm')}")
     found = quantity(float((np.nanmin if with_move else np.nanmax)(rows[0].values)), "s")
     caption = (
-        f"Time since the {since} until the reading stays within the band of its static value: {listed(bands)}.",
+        f"Time since {begun} until the reading stays within the band of its static value: {listed(bands)}.",
         "Gaps: not settled by the end of the run." if any(np.isnan(row.values).any() for row in rows) else "",
     )
     first = told[0].replace("_", " ")
@@ -207,7 +208,7 @@ def _over_time(results: Results, sensors: list[str], shown: list[Index]) -> Figu
     """Some variants over the time since the stop, the one that swings most of those with a history last."""
     seconds, _ = since_rest(results, sensors[0], shown[-1])
     size = quantity(float(residual_of(results, sensors[0])[shown[-1]]), results.sensors[sensors[0]])
-    moves = f"{sensors[0].replace('_', ' ')} swings by up to {size} about its static value after the stop"
+    moves = f"{sensors[0].replace('_', ' ')} swings by up to {size} about its static value after {since(results)}"
     caption = (
         "Readings from the moment on at which all carriages have come to rest or left."
         + (" Brightest line: the kept history that swings most." if len(shown) > 1 else "")
@@ -245,7 +246,7 @@ def _draw_time(results: Results, sensors: list[str], shown: list[Index], drawing
             axes.invert_yaxis()
     if len(shown) > 1:
         legend_of_all(drawing, rows[0])
-    rows[-1].set_xlabel("time after the stop (s)")
+    rows[-1].set_xlabel(f"time after {since(results)} (s)")
     drawing.align_ylabels()
 
 
