@@ -63,7 +63,7 @@ class NewmarkScheme:
     """A member of Newmark's family: u and u' advance with weights beta and gamma (Newmark 1959).
 
     With ``scaled_from`` below the limit no mode of a body has one: those that are faster than a step can follow keep
-    stiffness and damping ratio and take as much more mass (selective mass scaling, Olovsson et al. 2005). With
+    stiffness and damping and take as much more mass (selective mass scaling, Olovsson et al. 2005). With
     gamma = 1/2 this is Newmark's method with a larger beta for each of them,  beta + 1/scaled_from^2 - 1/(omega h)^2,
     but for the weights of the load.
 

@@ -82,14 +82,14 @@ class LaneTable:
 
     def steps_of(self, step: Array, ties: Counts | None = None, scaled_from: float = math.inf) -> Lanes:
         """The kernels' lanes for a step h (blocks, LANES) in s; ties: numbers of some, where not of all; scaled_from:
-        omega h from which modes take more mass, as if they vibrated more slowly, their stiffness the same."""
+        omega h from which modes take more mass, their stiffness and damping the same."""
         h = step[:, None, :]
         turned = self.omega[:, None] * h
         slower = np.minimum(1.0, scaled_from / np.maximum(turned, np.finfo(np.float64).tiny))
         own = np.arange(self.mass.shape[1]) if ties is None else ties
         return Lanes(
             stiffness=(turned * slower) ** 2,
-            damping=self.rates * h * slower,
+            damping=self.rates * h * slower**2,
             inverse_modal_mass=self.inverse_modal_mass * slower**2,
             coupling_mass=(self.mass + self.joint).take(own, 1) + self.damper.take(own, 1) * h,
             coupling_stiffness=self.spring.take(own, 1) * h**2,

@@ -121,11 +121,11 @@ def collect(
 
 def slowed(scene: Scene, scheme: Newmark | GeneralizedAlpha, h: float) -> Scene:
     """The scene whose modes with omega h beyond ``scaled_from`` have so much more mass that it is this, their stiffness
-    and damping ratios the same."""
+    and damping the same."""
     if not isinstance(scheme, Newmark) or math.isinf(scheme.scaled_from):
         return scene
     times = np.maximum(1.0, scene.omega * h / scheme.scaled_from)
-    return replace(scene, modal_mass=times**2, zeta=scene.zeta * times)
+    return replace(scene, modal_mass=times**2)
 
 
 def velocity_at_kink(scene: Scene, scheme: Newmark | GeneralizedAlpha, t: float, h: float, first: bool) -> Array:
