@@ -29,6 +29,13 @@ class Suspension(NamedTuple):
     damping: float
 
 
+LIKE_OSCILLATORS = dict.fromkeys(
+    ("frequency", "natural_frequency", "damping_ratio"),
+    "of a sprung mass m with the natural frequency f and the damping ratio D: stiffness = 4 pi^2 f^2 m (N/m), "
+    "damping = 4 pi D f m (N s/m)",
+)
+
+
 class Carriage(SpecOfKind):
     """Base of all carriages.
 
@@ -188,6 +195,7 @@ class OscillatorCarriage(PushingCarriage):
 
     masses: ClassVar[tuple[str, ...]] = ("mass", "wheel_mass")
     touching: ClassVar[tuple[str, ...]] = ("wheel_mass",)
+    looked_for: ClassVar[Mapping[str, str]] = dict(Carriage.looked_for) | LIKE_OSCILLATORS
 
     kind: Literal["oscillator"]
     mass: Mass = Field(gt=0)

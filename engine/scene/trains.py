@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal, TypeVar
 import numpy as np
 from pydantic import AfterValidator, Field, Strict, Tag, ValidationError, model_validator
 
+from engine.scene.carriages import LIKE_OSCILLATORS
 from engine.scene.motions.along_bodies import AnyMotion
 from engine.scene.motions.base import Motion
 from engine.study_file.document import Document
@@ -203,6 +204,7 @@ class MassTrain(Train):
 class OscillatorTrain(Train):
     """Sprung masses, each on a wheel of its own."""
 
+    looked_for: ClassVar[Mapping[str, str]] = dict(Train.looked_for) | LIKE_OSCILLATORS
     loads = ("mass", "wheel_mass")
     unsprung = "wheel_mass"
     springs = ("stiffness", "damping")

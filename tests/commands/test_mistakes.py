@@ -150,6 +150,21 @@ MISTAKES = {
     "a motion of a drive": (SMALL.replace('kind = "cruise"', 'kind = "s-curve"'), 2, ['mean "point-to-point"']),
     "a question by another name": (SMALL.replace('"passage"', '"moving-load"'), 2, ['did you mean "passage"']),
     "E I alone": (SMALL.replace("second_moment = 1e-6", "EI = 1e3"), 2, ["write second_moment = 1, youngs_modulus"]),
+    "a first frequency alone": (SMALL.replace("second_moment = 1e-6", "frequency = 3"), 2, ["4 f^2 length^4 m/pi^2"]),
+    "a soft end in a word": (SMALL.replace("pinned-pinned", "pinned-elastic"), 2, ["springs at ends are a list"]),
+    "a stiff end among springs": (
+        SMALL.replace('"pinned-pinned"', '["pinned", { at = 1, stiffness = 5e7 }]'), 2, ["list holds springs", "1e12"],
+    ),
+    "the frequency of a sprung mass": (
+        SMALL.replace('kind = "mass"', 'kind = "oscillator"\nstiffness = 9.0\nnatural_frequency = "1.5 Hz"'),
+        2, ["carriage.trolley.natural_frequency: unknown key", "stiffness = 4 pi^2 f^2 m (N/m)"],
+    ),
+    "the damping ratio of an axle": (
+        trained("damping_ratio = 0.1\naxles = 2\nspacing = 0.2")
+        .replace('"force"', '"oscillator"')
+        .replace("\nforce =", "\nmass ="),
+        2, ["train.ice.damping_ratio: unknown key", "damping = 4 pi D f m (N s/m)"],
+    ),
     "ends of an axis": (axis('m = { of = "gravity", start = 1, to = 2, count = 2 }'), 2, ['did you mean "from"']),
     "a limit of deflection": (f"{SMALL}\n[question]\ndeflection = 0.1\n", 2, ['did you mean "displacement"']),
     "braces over lines": (

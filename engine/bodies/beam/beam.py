@@ -8,7 +8,7 @@ from itertools import product
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field, Tag
+from pydantic import AfterValidator, BeforeValidator, Field, Tag
 
 from engine.bodies.modal.description import AUTO_MODES, MAX_MODES, Body, Growing, Rayleigh, Spot, Spots
 from engine.bodies.modal.modal_body import SAME_PLACE, Array, ModalBody
@@ -25,6 +25,7 @@ from engine.study_file.units import (
     RotationalStiffness,
     SecondMoment,
     Stiffness,
+    fault,
 )
 from results_schema.errors import BadInput
 
@@ -55,8 +56,34 @@ _MEANT = {
     "simply-supported": "pinned-pinned",
     "cantilever": "clamped-free",
 }
-Ends = Annotated[str, AfterValidator(one_of(*_ENDS, meant=_MEANT))]
-Springs = Annotated[Several[Spring], Field(min_length=1, max_length=100)]
+SPRINGS = (
+    'of a soft and a stiff end two springs: supports = [{ at = 0, stiffness = "1e12 N/m" }, { at = 24, stiffness = '
+    '"5e7 N/m" }], with numbers of your own'
+)
+
+
+def _without_words(value: Any) -> Any:
+    """The springs of a list, in which words for ends have no place."""
+    words = [one for one in value if isinstance(one, str)] if isinstance(value, list | tuple) else []
+    if words:
+        raise fault("this list holds springs", expected="tables", received=f'"{words[0]}"', remedy=SPRINGS)
+    return value
+
+
+def _without_springs(word: str) -> str:
+    """A word for both ends, which tells of no spring."""
+    if any(end.startswith(("elastic", "spring", "sprung", "soft")) for end in word.lower().split("-")):
+        raise fault(
+            "springs at ends are a list",
+            expected=" or ".join(END_WORDS) + " for each end",
+            received=f'"{word}"',
+            remedy=SPRINGS,
+        )
+    return word
+
+
+Ends = Annotated[str, AfterValidator(_without_springs), AfterValidator(one_of(*_ENDS, meant=_MEANT))]
+Springs = Annotated[Several[Spring], Field(min_length=1, max_length=100), BeforeValidator(_without_words)]
 Supports = Annotated[Annotated[Ends, Tag(WORD)] | Annotated[Springs, Tag(LIST)], by_form]
 
 
@@ -74,6 +101,10 @@ class Beam(Body):
     looked_for: ClassVar[Mapping[str, str]] = dict.fromkeys(
         ("EI", "bending_stiffness", "mass_per_metre", "mass_per_length", "linear_density", "mu"),
         "for E I and kg/m alone write second_moment = 1, youngs_modulus = E I, area = 1, density = the mass per metre",
+    ) | dict.fromkeys(
+        ("frequency", "natural_frequency", "first_frequency"),
+        "of a pinned beam with the first frequency f and the mass per metre m: second_moment = 1, area = 1, "
+        "density = m, youngs_modulus = 4 f^2 length^4 m/pi^2",
     )
 
     kind: Literal["beam"]
