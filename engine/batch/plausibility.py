@@ -17,6 +17,7 @@ from engine.batch.remarks_of_carriages import (
     in_thousandths,
     points_up,
     stays_level,
+    strikes_all_modes,
     swings_slowly,
     unreached,
     vanishes,
@@ -393,6 +394,7 @@ REMARKS = (
     stays_level,
     ends_early,
     vanishes,
+    strikes_all_modes,
     points_up,
     has_no_band,
 )

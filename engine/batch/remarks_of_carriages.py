@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +15,10 @@ from engine.scene.study import Study
 from engine.scene.variants import SpringKeys
 from engine.study_file.refusals import value_at
 from results_schema.arrays import Array
+from results_schema.quantities import QUANTITIES
+
+if TYPE_CHECKING:
+    from engine.bodies.modal.modal_body import ModalBody
 
 IN_A_ROW = 3  # axles: two excite little more than one
 RINGS = 5.0  # first periods after a train: of two spans 3.4 m/s2 were seen after one of them, 3.9 after five
@@ -24,6 +28,9 @@ SLOW = 0.1  # Hz, of a mass on its spring: vehicles swing at 0.5 to 20 Hz, and a
 FARTHEST = 100.0  # m from axle to axle: those of the longest wagons stand 20 m apart
 NEXT_TO_NO_DAMPING = 1e-4  # of critical: springs of steel alone have more; as a ratio is a number of N s/m
 _THOUSANDTHS = re.compile(r"(?<=[\d ./*])m(?:Pa\b|N\b(?=\s*\S))")  # of pascals, and of what loads are not
+GIVES_WAY = 0.01  # of the largest flexibility of a track: ends on rigid bearings and on "1e12 N/m" have far less
+TWICE = 2  # by time: accelerations
+PLACES = 9  # along a track, at which that is looked for
 BELOW = 1e-9  # relative: a limit that is missed by more is not reached
 
 
@@ -97,6 +104,30 @@ def vanishes(plan: Plan) -> Iterator[str]:
                 f"{table} is gone from {end:g} m on, where its {motion.kind} ends on a body of {length:g} m: an end at "
                 "or beyond that of the body lets it leave, other motions let it stop"
             )
+
+
+def strikes_all_modes(plan: Plan) -> Iterator[str]:
+    """One sentence for every body whose accelerations are read, and which loads step onto or off where it gives way."""
+    study = plan.study
+    read = {study.body_of(name) for name, sensor in study.sensor.items() if QUANTITIES[sensor.quantity].rate == TWICE}
+    for part in plan.base.bodies:
+        if part.name in read and not part.modal.rigid_modes and (soft := _soft_ends(plan, part.name, part.modal)):
+            yield (
+                f"loads step onto {part.name} or off it within no time at {' and '.join(soft)}, where it gives way, "
+                "which strikes every mode: accelerations are larger there than of wheels that roll over a joint, and a "
+                "frequency_limit of their sensors leaves fast modes out"
+            )
+
+
+def _soft_ends(plan: Plan, name: str, modal: ModalBody) -> list[str]:
+    """Ends of the track of a body that give way and that loads pass."""
+    motions = [one.motion for one in plan.study.carriage.values() if one.on == name and one.motion.passes]
+    passed = [float(motion.path(tau).S) for motion in motions for tau in (0.0, motion.duration)]
+    places = np.linspace(0.0, modal.length, PLACES)
+    flexible = np.abs(modal.influence_at(places, places))
+    soft = flexible[[0, -1]] > GIVES_WAY * flexible.max()
+    over = [any(place <= 0.0 for place in passed), any(place >= modal.length for place in passed)]
+    return [f"{end:g} m" for end, here in zip((0.0, modal.length), soft & over, strict=True) if here]
 
 
 def points_up(plan: Plan) -> Iterator[str]:

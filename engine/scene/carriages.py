@@ -11,7 +11,19 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from engine.bodies.modal.modal_body import Direction
 from engine.scene.motions.along_bodies import AnyMotion
 from engine.study_file.checks import Check, on_body
-from engine.study_file.spec import NUMBER, ROPE, WORD, KindOf, Noun, Spec, SpecOfKind, Three, form_of_amount, kinds
+from engine.study_file.spec import (
+    LIKE_OSCILLATORS,
+    NUMBER,
+    ROPE,
+    WORD,
+    KindOf,
+    Noun,
+    Spec,
+    SpecOfKind,
+    Three,
+    form_of_amount,
+    kinds,
+)
 from engine.study_file.units import Damping, Force, Inertia, Length, Mass, Stiffness, Time, fault
 
 MAX_CONTACTS = 12
@@ -27,13 +39,6 @@ class Suspension(NamedTuple):
     mass: float
     stiffness: float
     damping: float
-
-
-LIKE_OSCILLATORS = dict.fromkeys(
-    ("frequency", "natural_frequency", "damping_ratio"),
-    "of a sprung mass m with the natural frequency f and the damping ratio D: stiffness = 4 pi^2 f^2 m (N/m), "
-    "damping = 4 pi D f m (N s/m)",
-)
 
 
 class Carriage(SpecOfKind):

@@ -10,12 +10,11 @@ from typing import Annotated, Any, ClassVar, Literal, TypeVar
 import numpy as np
 from pydantic import AfterValidator, Field, Strict, Tag, ValidationError, model_validator
 
-from engine.scene.carriages import LIKE_OSCILLATORS
 from engine.scene.motions.along_bodies import AnyMotion
 from engine.scene.motions.base import Motion
 from engine.study_file.document import Document
 from engine.study_file.refusals import refuse
-from engine.study_file.spec import LIST, NUMBER, KindOf, Noun, Spec, by_amount_form
+from engine.study_file.spec import LIKE_OSCILLATORS, LIST, NUMBER, KindOf, Noun, Spec, by_amount_form
 from engine.study_file.units import Damping, Dimensionless, Force, Length, Mass, Stiffness, Time, fault
 from results_schema.arrays import Array
 

@@ -164,6 +164,12 @@ def ascending(values: tuple[Any, ...]) -> tuple[Any, ...]:
     return values
 
 
+#: Keys that others look for in a mass on a spring.
+LIKE_OSCILLATORS = dict.fromkeys(
+    ("frequency", "natural_frequency", "damping_ratio"),
+    "of a sprung mass m with the natural frequency f and the damping ratio D: stiffness = 4 pi^2 f^2 m (N/m), "
+    "damping = 4 pi D f m (N s/m)",
+)
 ROPE = (
     'a hanging mass that goes up and down is kind = "oscillator"; one that swings on a rope is a link of a robot '
     '(kind = "portal" in docs/study-file.md)'
