@@ -15,6 +15,7 @@ from studies.findings.absolute_errors import weight
 from studies.findings.amplification import largest, sizes
 from studies.findings.beyond import AskedOfPassages, ranked
 from studies.findings.effects import unchanged
+from studies.findings.residual import crosses
 from studies.pictures.common import figures as look
 from studies.pictures.common import residual
 from studies.pictures.common.figures import Figure, colour_bar, draw, legend_beside, zero_line
@@ -46,7 +47,8 @@ FLAT = 0.1  # a map of ratios that vary less shows nothing
 
 def pictures(results: Results) -> list[Figure]:
     """All figures that the sweep and the kept histories allow: what rings on, where that is told, sizes of the first
-    quantity and of those with a limit come first, those of others last."""
+    quantity and of those with a limit come first, those of others last. What rings on after a crossing comes behind
+    these sizes."""
     limits = question_of(results.study, AskedOfPassages)
     sensors = [name for name in ranked(results, limits) if np.isfinite(sizes(results, name)).any()]
     if not sensors:
@@ -77,7 +79,9 @@ def pictures(results: Results) -> list[Figure]:
     found = [*first, *on_the_way, *others]
     if level and found:
         found[0] = replace(found[0], caption=" ".join([found[0].caption, *level]))
-    return [*residual.pictures(results, limits), *_dotted_once(found)]
+    rings, found = residual.pictures(results, limits), _dotted_once(found)
+    place = len(first) if crosses(results) else 0
+    return [*found[:place], *rings, *found[place:]]
 
 
 def _dotted_once(figures: list[Figure]) -> list[Figure]:

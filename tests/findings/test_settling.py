@@ -156,6 +156,8 @@ def test_what_swings_on_after_a_crossing_stands_behind_how_far_it_bent() -> None
     assert np.ptp(found.midspan_move_and_settle_time.values) > 0.0
     assert not any("move and settling" in text or "the stop" in text for text in answers.answer(found))
     titles = {one.name: one.title for one in studies.figures(found)}
+    one, two = list(titles)[:2]
+    assert one.startswith("largest-displacement") and two == "residual"
     assert titles["settling"].startswith("midspan takes up to ") and "has left" in titles["residual"]
 
 
