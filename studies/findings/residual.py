@@ -73,8 +73,9 @@ class Times(NamedTuple):
 
 
 def crosses(results: Results) -> bool:
-    """Whether all carriages leave their bodies, so that there is no stop."""
-    return all(carriage.motion.passes for carriage in results.study.carriage.values())
+    """Whether there is nothing but carriages that leave their bodies, so that there is no stop."""
+    study = results.study
+    return bool(study.carriage) and not study.frame and all(one.motion.passes for one in study.carriage.values())
 
 
 def since(results: Results) -> str:
