@@ -79,7 +79,7 @@ def crosses(results: Results) -> bool:
 
 
 def since(results: Results) -> str:
-    """What what swings on is told after."""
+    """The event from which on vibrations count as residual, in words."""
     return "the last carriage has left" if crosses(results) else "the stop"
 
 

@@ -160,8 +160,8 @@ def remedy(results: Results) -> str:
     more = [f"{len(sensors) - MOST_MISSED} more"] if len(sensors) > MOST_MISSED else []
     names = listed([*sensors[:MOST_MISSED], *more])
     where = f"the sensor{'s' if len(sensors) > 1 else ''} {names}" if sensors else "sensors"
-    told = f'`tolerance = "told"` on {where}'
-    helps = f" What helps: {told}, so that errors are estimated and not held, or a larger tolerance"
+    without = f'`tolerance = "told"` on {where}'
+    helps = f" What helps: {without}, so that errors are estimated and not held, or a larger tolerance"
     moving = results.study.carriage.items()
     jumps = [(name, one.motion.smoothed_by) for name, one in moving if "along" in one.pushes and one.motion.smoothed_by]
     smooth = listed([f"carriage.{name}.motion.{key}" for name, key in jumps])

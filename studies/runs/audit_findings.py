@@ -18,8 +18,8 @@ from studies.results.formatting import counted, listed, percent, scientific, tim
 from studies.results.results import Results
 from studies.runs.not_audited import told_none, told_none_briefly
 
-FIXED = "what a study fixes itself, as its model, modes, steps or elements, is estimated without any status"
-ELEMENTS = "errors by the elements of frames are estimated without any status: more elements lessen them"
+FIXED = "errors by what a study fixes itself, as its model, modes, steps or elements, change no status"
+ELEMENTS = "errors by the elements of frames change no status: more elements lessen them"
 LARGE = 0.02  # an estimated error that people should know of where nothing holds it: what figures hardly show
 
 

@@ -90,8 +90,8 @@ def test_answers_say_so() -> None:
     """And what helps, where the study fixes nothing else."""
     fixes = bridge(3), bridge(3, solver={"steps": 400}), bridge(16)
     said = [told_accuracy(None, Results.of(studies.run(given))) for given in fixes]
-    why = "what a study fixes itself, as its model, modes, steps or elements, is estimated without any status"
-    alone = "errors by the elements of frames are estimated without any status: more elements lessen them"
+    why = "errors by what a study fixes itself, as its model, modes, steps or elements, change no status"
+    alone = "errors by the elements of frames change no status: more elements lessen them"
     assert f"where 1e-3 was asked ({alone})" in said[0] and f"where 1e-3 was asked ({why})" in said[1]
     assert "where 1e-3 was asked;" in said[2]
 

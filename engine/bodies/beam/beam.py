@@ -56,7 +56,7 @@ _MEANT = {
     "simply-supported": "pinned-pinned",
     "cantilever": "clamped-free",
 }
-SPRINGS = (
+SOFT_END = (
     'of a soft and a stiff end two springs: supports = [{ at = 0, stiffness = "1e12 N/m" }, { at = 24, stiffness = '
     '"5e7 N/m" }], with numbers of your own'
 )
@@ -66,7 +66,7 @@ def _without_words(value: Any) -> Any:
     """The springs of a list, in which words for ends have no place."""
     words = [one for one in value if isinstance(one, str)] if isinstance(value, list | tuple) else []
     if words:
-        raise fault("this list holds springs", expected="tables", received=f'"{words[0]}"', remedy=SPRINGS)
+        raise fault("this list holds springs", expected="tables", received=f'"{words[0]}"', remedy=SOFT_END)
     return value
 
 
@@ -77,7 +77,7 @@ def _without_springs(word: str) -> str:
             "springs at ends are a list",
             expected=" or ".join(END_WORDS) + " for each end",
             received=f'"{word}"',
-            remedy=SPRINGS,
+            remedy=SOFT_END,
         )
     return word
 
