@@ -74,8 +74,9 @@ declare(
         estimated_error | result | | optional float32 nan | estimated error of every reported number
             over the largest static value of the sensor (velocity and acceleration, and where it reads nothing at rest:
             over its own largest value; contact forces: over the weight; positions and lags: over the length of the
-            track and of the cruise; indices: as they are; frequencies, settling times and times of move and settling:
-            over themselves; other results at rest: over the largest along the way); of places no less than a step; NaN
+            track and of the cruise; times of extremes: over one passage or cycle; indices: as they are; frequencies,
+            settling times and times of move and settling: over themselves; other results at rest: over the largest
+            along the way); of places and times of extremes no less than a step; NaN
             where no estimate exists
         tolerance | result | | optional alone nan | tolerance of every reported number
             that of its sensor, else solver.tolerance; NaN where the error is reported, but not held
@@ -90,11 +91,15 @@ MARCH = outputs("""
     {sensor}_max_position | | m | nan | position of the first carriage at the largest value of {sensor}
         of the first one also where the sensor is under another; NaN where it was off its body, as the first axle of a
         train often is by then
+    {sensor}_max_time | | s | optional nan | time of the largest value of {sensor}
+        since time 0, at its step; NaN where it has none
     {sensor}_min | | {sensor} | | smallest value of {sensor}
         over all step instants (asymmetry, double-peak: of the last cycle)
     {sensor}_min_position | | m | nan | position of the first carriage at the smallest value of {sensor}
         of the first one also where the sensor is under another; NaN where it was off its body, as the first axle of a
         train often is by then
+    {sensor}_min_time | | s | optional nan | time of the smallest value of {sensor}
+        since time 0, at its step; NaN where it has none
     {sensor}_rms | | {sensor} | optional | root mean square of {sensor}
         averaged over the recorded time; of sensors under a carriage, over the time that it is on the body
     {sensor}_residual | | {sensor} | optional nan | residual vibration of {sensor}

@@ -19,6 +19,7 @@ __all__ = [
     "EVERY_KIND",
     "MARCH",
     "RESERVED",
+    "WHERE_OR_WHEN",
     "Variable",
     "axes",
     "declarations",
@@ -42,6 +43,8 @@ _RESERVED_WORDS = """
 _NONE: Mapping[str, str] = MappingProxyType({})
 # Names of results, not usable for a sweep's axis, a sensor or a carriage.
 RESERVED: frozenset[str] = frozenset(_RESERVED_WORDS.split())
+#: Endings of results that tell where or when something was largest, which jump from one extreme to another.
+WHERE_OR_WHEN = ("_position", "_max_time", "_min_time")
 
 
 def registered() -> dict[str, tuple[Variable, ...]]:

@@ -20,6 +20,7 @@ from engine.observation.cycle_reduction import HISTORY_PART, Compared
 from results_schema.arrays import Array
 from results_schema.gravest_status import lost
 from results_schema.quantities import QUANTITIES
+from results_schema.variables import WHERE_OR_WHEN
 
 if TYPE_CHECKING:
     from engine.march.outcome import Asked, Outcome
@@ -75,6 +76,10 @@ class Pair:
         """A place, over the length of the first carriage's track."""
         return self.gap(name) / self.model.riders[0].length
 
+    def instant(self, name: str) -> Array:
+        """The time of an extreme, over that of one passage or cycle."""
+        return np.asarray(self.gap(name) / self.values.scene_time_scale)
+
     def duration(self, name: str) -> Array:
         """A time that something takes, over itself."""
         return _over(self.gap(name), np.abs(self.other.numbers[name]))
@@ -124,6 +129,8 @@ def _of_sensors(asked: Asked) -> Iterator[Entry]:
             yield Result(own, name, *extreme), partial(Pair.reading, name=own, sensor=j)
         for own in (f"{name}_{end}_position" for end in ENDS):
             yield Result(own, name), partial(Pair.place, name=own)
+        for own in (f"{name}_{end}_time" for end in ENDS * asked.study.output.times):
+            yield Result(own, name), partial(Pair.instant, name=own)
         if sensor.settling_band is not None:
             for own in names_of_times(name):
                 yield Result(own, name), partial(Pair.duration, name=own)
@@ -208,7 +215,7 @@ def deciding(results: tuple[Result, ...], tolerance: float) -> tuple[Result, ...
     ``tolerance``, but for places and times of settling, which jump, and contact forces beside anything else."""
     if any(np.isfinite(result.tolerance) for result in results):
         return results
-    jump = ("_position", *names_of_times(""))
+    jump = (*WHERE_OR_WHEN, *names_of_times(""))
     left_out = (*jump, *(f"_contact_force_{end}" for end in ENDS))
     left_out = jump if all(result.name.endswith(left_out) for result in results) else left_out
     return tuple(r if r.name.endswith(left_out) else r._replace(tolerance=tolerance, follows=True) for r in results)

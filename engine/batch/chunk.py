@@ -26,7 +26,7 @@ from results_schema.errors import WorkersGaveUp
 from results_schema.gravest_status import gravest, lost
 from results_schema.status import Status
 from results_schema.store.rows import Arrays, Chunk, Rows, joined
-from results_schema.variables import axes, expand
+from results_schema.variables import WHERE_OR_WHEN, axes, expand
 
 if TYPE_CHECKING:
     from engine.batch.plan import Plan
@@ -123,12 +123,12 @@ def _in_si(plan: Plan, values: VariantValues, arrays: Arrays) -> Arrays:
 
 
 def told_errors(found: Found, asked: Asked) -> Array:
-    """(R, V) the estimated errors; of places no less than a step is long, and no more than the track; of times that
-    sensors take to settle as `_told_of_times` has them."""
+    """(R, V) the estimated errors; of places and times of extremes no less than a step, and no more than the track
+    and the passage; of times that sensors take to settle as `_told_of_times` has them."""
     error, results = np.where(np.isfinite(found.error), found.error, np.nan), results_of(asked)
     steps = np.maximum(found.used["steps_used"], 1)
     for number, result in enumerate(results):
-        if result.name.endswith("_position"):
+        if result.name.endswith(WHERE_OR_WHEN):
             least = np.where(found.used["steps_used"] > 0, 1.0 / steps, 0.0)
             error[number] = np.minimum(np.maximum(error[number], least), 1.0)
     _told_of_times(found.outcome, asked, {result.name: error[n] for n, result in enumerate(results)})

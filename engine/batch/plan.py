@@ -353,7 +353,7 @@ def _rest(scene: SceneModel) -> str:
 def numbers_per_variant(asked: Asked) -> int:
     """Numbers of 8 bytes that are kept of one variant, besides histories."""
     study, reduction = asked.study, asked.reduction
-    found = (6 + study.output.residual) * len(study.sensor) + 2 * len(settling(study))
+    found = (6 + study.output.residual + 2 * study.output.times) * len(study.sensor) + 2 * len(settling(study))
     found += 4 * len(study.carriage) + 10 + 2 * places_read(study)
     found += -(-len(results_of(asked)) // 2)  # errors are of half that size
     if reduction is not None:

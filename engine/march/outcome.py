@@ -14,7 +14,7 @@ from engine.kernels import layout
 from engine.kernels.schemes import Scheme
 from engine.march.envelopes import MOST_KEPT, envelope_names
 from engine.march.march import Marched
-from engine.march.rest import counts_settling, elapsed, residuals, settling_times
+from engine.march.rest import counts_settling, elapsed, residuals, seconds_at, settling_times
 from engine.march.richardson import march_scheme
 from engine.march.tables import SceneTables
 from engine.model.lane_table import in_whole_blocks, weight, weights
@@ -35,6 +35,7 @@ NOWHERE: Counts = np.zeros(0, dtype=np.int64)
 STILL = 1e-6  # of the usual reading on its body: a static reading below, as on a support, is rounding (1e-12 at most)
 
 Flat = dict[str, NDArray[Any]]
+ENDS = (("max", layout.LARGEST, layout.LARGEST_AT), ("min", layout.SMALLEST, layout.SMALLEST_AT))
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +119,7 @@ def outcome(
     reduction = marched.history[np.searchsorted(counts, own), : len(asked.study.sensor)]
     settling = settling_times(tables, values, counts, marched.history)
     numbers = {
-        **_extremes(tables, marched, counts),
+        **_extremes(tables, values, marched, counts),
         **residuals(tables, values, marched),
         **settling.times,
         **_contact_forces(tables, values, marched),
@@ -171,8 +172,9 @@ def _silence(tables: SceneTables, marched: Marched) -> None:
                 statistics[mark] = np.where(np.isfinite(statistics[mark]), 0.0, statistics[mark])
 
 
-def _extremes(tables: SceneTables, marched: Marched, counts: Counts) -> Flat:
-    """Largest and smallest value of every sensor, where the first carriage was then, and the root mean square."""
+def _extremes(tables: SceneTables, values: VariantValues, marched: Marched, counts: Counts) -> Flat:
+    """Largest and smallest value of every sensor, where the first carriage was then, when that was if it is asked for,
+    and the root mean square."""
     found: Flat = {}
     for side in tables.kinks:
         reading = np.tensordot(side.weights, marched.history[np.searchsorted(counts, side.counts), side.sensor], 1)
@@ -180,10 +182,11 @@ def _extremes(tables: SceneTables, marched: Marched, counts: Counts) -> Flat:
     for j, sensor in enumerate(tables.sensors[: len(tables.model.study.sensor)]):
         statistics = marched.statistics[j]
         seen = np.isfinite(statistics[layout.LARGEST]) | np.isnan(statistics[layout.LARGEST])
-        found[f"{sensor.name}_max"] = np.where(seen, statistics[layout.LARGEST], np.nan)
-        found[f"{sensor.name}_min"] = np.where(seen, statistics[layout.SMALLEST], np.nan)
-        places = tables.timeline.positions(0, statistics[[layout.LARGEST_AT, layout.SMALLEST_AT]])
-        found[f"{sensor.name}_max_position"], found[f"{sensor.name}_min_position"] = places
+        for end, value, at in ENDS:
+            found[f"{sensor.name}_{end}"] = np.where(seen, statistics[value], np.nan)
+            found[f"{sensor.name}_{end}_position"] = tables.timeline.positions(0, statistics[at])
+            if tables.model.study.output.times:
+                found[f"{sensor.name}_{end}_time"] = seconds_at(tables, statistics[at], values.scene_time_scale)
         found[f"{sensor.name}_rms"] = np.sqrt(
             statistics[layout.SQUARES] / np.where(statistics[layout.SECONDS] > 0.0, statistics[layout.SECONDS], 1.0)
         )
@@ -192,10 +195,7 @@ def _extremes(tables: SceneTables, marched: Marched, counts: Counts) -> Flat:
 
 def _include(statistics: Array, reading: Array, at: float) -> None:
     """Let a reading (V,) at a moment, given by its count, count among a sensor's extremes."""
-    for value, place, beyond in (
-        (layout.LARGEST, layout.LARGEST_AT, np.greater),
-        (layout.SMALLEST, layout.SMALLEST_AT, np.less),
-    ):
+    for (_, value, place), beyond in zip(ENDS, (np.greater, np.less), strict=True):
         more = beyond(reading, statistics[value])
         statistics[value] = np.where(more, reading, statistics[value])
         statistics[place] = np.where(more, at, statistics[place])
@@ -208,8 +208,8 @@ def _envelopes(own: SceneTables, values: VariantValues, size: int, halted: Calla
     for tables in own.companions:
         marched = march_scheme(tables, values, nothing, size, halted)
         for j, place in enumerate(tables.sensors):
-            for end, mark in (("max", layout.LARGEST), ("min", layout.SMALLEST)):
-                found[f"{place.name}_envelope_{end}"].append(marched.statistics[j, mark])
+            for end, value, _ in ENDS:
+                found[f"{place.name}_envelope_{end}"].append(marched.statistics[j, value])
         if len(own.companions) > MOST_KEPT:
             tables.forget()
     return {name: np.stack(readings, axis=1) for name, readings in found.items()}

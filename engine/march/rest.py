@@ -165,9 +165,14 @@ def _static(tables: SceneTables, values: VariantValues) -> Array:
 
 def elapsed(tables: SceneTables, counts: Counts, time_scale: Array) -> Array:
     """(V, H) seconds since time 0 of stations by their count."""
+    return seconds_at(tables, counts.astype(np.float64), time_scale[:, None])
+
+
+def seconds_at(tables: SceneTables, counts: Array, time_scale: Array) -> Array:
+    """Seconds since time 0 of stations by their count, by the time scale of each; NaN where the count is negative."""
     timeline = tables.timeline
-    index, tau = timeline.moments(counts.astype(np.float64))
-    found = tau * time_scale[:, None]
+    index, tau = timeline.moments(counts)
+    found = np.where(counts >= 0.0, tau, np.nan) * time_scale
     free = np.array([segment.free for segment in timeline.segments])[index]
     if free.any():
         start = next(segment.first for segment in timeline.segments if segment.free)

@@ -93,7 +93,8 @@ class Output(Spec):
     result with the variants that have them, or these and the percentiles. cells: the axes that stay where variants are
     reduced; all of the grid beside a sample if not given, else none. unreduced: number of variants, spread over the
     sweep, that are computed again by the unreduced finite-element model. residual: whether it is told how far sensors
-    swing when all carriages have come to rest or left.
+    swing when all carriages have come to rest or left. times: whether it is told when sensors are largest
+    and smallest.
     """
 
     histories: Annotated[
@@ -104,6 +105,7 @@ class Output(Spec):
     cells: Several[str] | None = None
     unreduced: int = Field(default=0, ge=0, le=1000)
     residual: bool = False
+    times: bool = False
 
     @property
     def keeps_variants(self) -> bool:

@@ -37,7 +37,10 @@ class MovingFrames(PiecedKind):
     names_limits = True
     sweeps = True
     audit_seconds = AUDIT_SECONDS
-    instead_of_residual = 'quantity = "position_error" on a sensor, of which SENSOR_after_stop_max is told'
+    instead: Mapping[str, str] = {
+        "residual": 'quantity = "position_error" on a sensor, of which SENSOR_after_stop_max is told',
+        "times": "leave it out: SENSOR_max_time and SENSOR_min_time are always told",
+    }
     moves_frames = True
     drawn_by = "studies.pictures.moving_frames"
 

@@ -128,7 +128,7 @@ class PiecedKind(Kind, ABC):
 
     sweeps = False
     audit_seconds = 0.0
-    instead_of_residual = ""  # what such a study tells of the time after a stop
+    instead: Mapping[str, str] = {}  # of keys of [output] that it does not take: what it tells in their place
 
     def check_tables(self, study: Study) -> None:
         if study.sweep.axes and not self.sweeps:
@@ -142,10 +142,10 @@ class PiecedKind(Kind, ABC):
         if not study.output.keeps_variants:
             what = f"studies of the kind {self.name} are not marched by variants that could be reduced"
             raise study.source.fault("output.keep", what, expected='"all"', received=study.output.keep)
-        if study.output.residual:
-            what = f"studies of the kind {self.name} tell no residual vibration"
-            source, remedy = study.source, self.instead_of_residual
-            raise source.fault("output.residual", what, expected="false", received="true", remedy=remedy)
+        for key, of in (("residual", "residual vibration"), ("times", "times of extremes by this key")):
+            if getattr(study.output, key):
+                what, remedy = f"studies of the kind {self.name} tell no {of}", self.instead.get(key, "")
+                raise study.source.fault(f"output.{key}", what, expected="false", received="true", remedy=remedy)
         if study.envelope:
             what, expected = f"studies of the kind {self.name} have no envelopes", "no table [envelope]"
             raise study.source.fault("envelope", what, expected=expected, received=", ".join(study.envelope))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from results_schema.arrays import Array
 from results_schema.lazy_imports import xr
 from results_schema.status import Fidelity, Status
+from results_schema.variables import WHERE_OR_WHEN
 from studies.at_rest.errors import told_errors
 from studies.findings.numerics_used import ERROR, is_marched, known, of_variants
 from studies.results.cells import words_of
@@ -248,7 +249,7 @@ def _unheld(group: xr.Dataset, results: Results) -> str:
 
 def _no_places(names: NDArray[Any]) -> NDArray[np.bool_]:
     """Which results are no places or times of extremes, which jump."""
-    return np.array([not str(name).endswith(("_position", "_max_time", "_min_time")) for name in names])
+    return np.array([not str(name).endswith(WHERE_OR_WHEN) for name in names])
 
 
 def _worst(group: xr.Dataset, verdict: Verdict) -> tuple[float, float, str]:
