@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     from engine.model.timeline import Segment
 
 
+IN_CACHE = 2**20  # bytes of rows
+
+
 def ties_of(model: SceneModel, active: Sequence[bool]) -> Counts:
     """Numbers of the ties that count where riders are on their bodies or not (``active``): those of carriages that are
     off theirs push nothing. No table is without any, so the first one stays where all are."""
@@ -79,13 +82,8 @@ def tie_rows(model: SceneModel, along: Along, ties: Counts, missed: Array | None
     rows, drive = np.zeros((stations, model.omega.size, ties.size, 4)), np.zeros((stations, ties.size))
     level = np.zeros_like(drive)
     missed = residual(model, along, ties) if missed is None else missed
+    _add_attachments(rows, model, along, ties)
     for place, r in enumerate(ties):
-        for attachment in model.attachments[r]:
-            if holds(attachment, along):
-                motion = _motion(model, r, attachment, along)
-                shapes = shape_derivatives(model, attachment, along, motion.highest)
-                first = model.bodies[attachment.body].modes.start
-                add_attachment(rows, place, first, attachment.factor, shapes, motion.factors)
         if r >= model.first_push:
             push = model.pushes[r - model.first_push]
             way = along[push.carriage]
@@ -104,6 +102,22 @@ def tie_rows(model: SceneModel, along: Along, ties: Counts, missed: Array | None
     if np.isin(ties, model.corrected).any():
         rows[:, model.residuals, :, FORCE] = residual_rows(model, ties, missed)
     return TieRows(ties, rows, drive, level, missed)
+
+
+def _add_attachments(rows: Array, model: SceneModel, along: Along, ties: Counts) -> None:
+    """Add where some ties hold bodies to their rows, by stations whose rows stay in the cache meanwhile."""
+    held = []
+    for place, r in enumerate(ties):
+        for attachment in (one for one in model.attachments[r] if holds(one, along)):
+            motion = _motion(model, r, attachment, along)
+            shapes = shape_derivatives(model, attachment, along, motion.highest)
+            first = model.bodies[attachment.body].modes.start
+            held.append((place, first, attachment.factor, shapes, motion.factors))
+    together = max(1, IN_CACHE // rows[0].nbytes)
+    for part in (slice(first, first + together) for first in range(0, len(rows), together)):
+        for place, first, factor, shapes, factors in held:
+            here = shapes[:, part] if shapes.shape[1] > 1 else shapes
+            add_attachment(rows[part], place, first, factor, here, factors[:, part])
 
 
 def closed(model: SceneModel, found: TieRows, scheme: Newmark | Alpha) -> Ties:
