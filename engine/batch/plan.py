@@ -325,7 +325,7 @@ def check_readings(scene: SceneModel, window: Window) -> None:
     tables = SceneTables(scene, 1, window)
     if scene.study.output.residual and (window != "whole" or not tables.at_rest.size):
         what = "a residual vibration is read over a whole run with rest at its end"
-        moves = "a motion with a dwell (point-to-point, timed-move), or after (cruise), last"
+        moves = "a motion with a dwell (such as point-to-point), or after (cruise), last"
         expected = f'kind = "passage" or "trajectory", and {moves}'
         remedy = "" if window != "whole" else _rest(scene)
         raise scene.study.source.fault("output.residual", what, expected=expected, received="true", remedy=remedy)

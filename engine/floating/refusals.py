@@ -9,6 +9,7 @@ import numpy as np
 
 from engine.floating.bodies.fields import ABOUT_X, Z
 from engine.scene.frames import GROUND, Frame, Free
+from engine.scene.motions.along_bodies import MOTIONS
 
 if TYPE_CHECKING:
     from engine.floating.model import FloatingModel
@@ -64,8 +65,8 @@ def _check_carriage(study: Study, name: str, carriage: Carriage) -> None:
         raise fault(f"{here}.kind", what, expected="mass or oscillator", received=carriage.kind)
     if not motion.slides and not motion.in_pieces:
         what = "this motion on bodies in frames that move is not built yet"
-        expected = "free, cruise, out-and-back, sinusoidal, waypoints, point-to-point or timed-move"
-        raise fault(f"{here}.motion.kind", what, expected=expected, received=motion.kind)
+        known = ", ".join(kind for kind, one in MOTIONS.own.items() if one.slides or one.in_pieces)
+        raise fault(f"{here}.motion.kind", what, expected=known, received=motion.kind)
     if motion.legs is not None and motion.duration > MOST_CYCLES:
         what, received = "too many cycles on a body in a frame that moves", f"{motion.duration:.0f}"
         raise fault(f"{here}.motion.cycles", what, expected=f"at most {MOST_CYCLES}", received=received)

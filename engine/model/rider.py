@@ -76,7 +76,7 @@ class Rider:
     @cached_property
     def _own_events(self) -> tuple[float, ...]:
         """The motion's own times at which its law changes, ascending."""
-        return (0.0, *self.motion.breaks().tolist(), self.motion.duration)
+        return (0.0, *map(float, self.motion.breaks()), self.motion.duration)
 
     def touches(self, start: float, end: float) -> bool:
         """Whether the carriage is on the body between two neighbouring events."""

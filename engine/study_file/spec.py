@@ -190,6 +190,7 @@ _MEANT = by_other_names(
     ("mass", "moving-mass point-mass"),
     ("point-to-point", "trapezoidal trapezoid s-curve scurve ptp"),
     ("timed-move", "move-in-time move-time timed"),
+    ("minimum-jerk", "min-jerk minjerk quintic polynomial"),
     ("cruise", "constant-speed constant linear uniform"),
     ("rigid", "mass rigid-body lump payload"),  # of a body; "mass" is a carriage
     ("waypoints", "cycloidal rest-to-rest"),

@@ -21,6 +21,7 @@ MOTIONS = {
     "backward cruise": {"kind": "cruise", "start": 12.0, "end": 2.0, "speed": 3.0},
     "jerk-limited": STOPPING | {"jerk": 20.0, "dwell": 0.5},
     "in a time": {"kind": "timed-move", "start": 2.0, "end": 12.0, "time": 4.5, "dwell": 0.5},
+    "of least jerk": {"kind": "minimum-jerk", "start": 12.0, "end": 2.0, "time": 4.5, "dwell": 0.5},
     "a trapezoid, backward": STOPPING | {"start": 12.0, "end": 2.0},
     "too short for its speed": STOPPING | {"end": 2.5, "jerk": 20.0},
     "spline": {"kind": "waypoints", "times": [0, 2, 5], "positions": [3, 10, 4]},

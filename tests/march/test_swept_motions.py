@@ -20,6 +20,7 @@ MOTIONS: dict[str, Table] = {
         "dwell": 1.0,
     },
     "timed-move": {"kind": "timed-move", "start": 0.1, "end": 0.9, "time": 3.0, "dwell": 1.0},
+    "minimum-jerk": {"kind": "minimum-jerk", "start": 0.1, "end": 0.9, "time": 3.0, "dwell": 1.0},
     "waypoints": {"kind": "waypoints", "times": [0.0, 2.0, 4.0], "positions": [0.1, 0.8, 0.3]},
 }
 NUMBERS = [(kind, key) for kind, motion in MOTIONS.items() for key, value in motion.items() if isinstance(value, float)]

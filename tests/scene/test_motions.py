@@ -2,6 +2,7 @@
 
 import math
 from itertools import pairwise
+from math import factorial
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 
 from engine.scene.motions.along_bodies import Cruise, OutAndBack, Sinusoidal, Waypoints
 from engine.scene.motions.base import BetweenPlaces, Motion
+from engine.scene.motions.minimum_jerk import MinimumJerk
 from engine.scene.motions.point_to_point import PointToPoint, TimedMove
 from tests.naive import motions as naive
 from tests.naive.robots_as_particles import pieces
@@ -63,7 +65,13 @@ timed = st.builds(
     st.floats(0.1, 10.0),
     st.just(0.0) | st.floats(0.01, 3.0),
 )
-laws = cruises | shuttles | sines | waypoints() | moves | timed
+smooth = st.builds(
+    lambda s, time, rest: MinimumJerk(kind="minimum-jerk", time=time, dwell=rest, **s),
+    strokes(),
+    st.floats(0.1, 10.0),
+    st.just(0.0) | st.floats(0.01, 3.0),
+)
+laws = cruises | shuttles | sines | waypoints() | moves | timed | smooth
 
 
 def smooth_instants(motion: Motion, margin: float) -> np.ndarray:
@@ -229,6 +237,31 @@ def test_a_timed_move_has_a_constant_jerk_in_each_quarter(start: float, end: flo
     phases = [(quarter, 0.0, jerk), (quarter, push, -jerk), (quarter, 0.0, -jerk), (quarter, -push, jerk)]
     compare_with_phases(motion, naive.point_to_point(start, end, [*phases, (dwell, 0.0, 0.0)] if dwell else phases))
     assert [float(motion.path(tau).S) for tau in (0.0, motion.rests_from, 1.0)] == [start, end, end]
+
+
+@pytest.mark.parametrize("dwell", [0.0, 0.4])
+@pytest.mark.parametrize(("start", "end"), [(0.6, 3.6), (3.6, 0.6)])
+def test_a_move_of_least_jerk_is_the_quintic_at_rest_at_both_ends(start: float, end: float, dwell: float) -> None:
+    """By its six conditions: what jerk's square is least for has a sixth derivative of 0."""
+    time = 1.3
+    motion = MinimumJerk(kind="minimum-jerk", start=start, end=end, time=time, dwell=dwell)
+    powers = np.arange(6)
+    conditions = [
+        [factorial(k) / factorial(k - order) * at ** (k - order) if k >= order else 0.0 for k in powers]
+        for at in (0.0, time)
+        for order in range(3)
+    ]
+    quintic = np.polynomial.Polynomial(np.linalg.solve(conditions, [start, 0.0, 0.0, end, 0.0, 0.0]))
+    times = np.linspace(0.0, time, 101)
+    path = motion.path(times / motion.time_scale)
+    for order, (found, size) in enumerate(zip(path, (1.0, 5.0, 20.0), strict=True)):
+        wanted = quintic.deriv(order)(times)
+        np.testing.assert_allclose(found / motion.time_scale**order, wanted, atol=1e-11 * size)
+    speed = motion.max_speed / motion.time_scale
+    assert speed == pytest.approx(np.abs(quintic.deriv()(times)).max(), rel=1e-12)
+    rest = motion.path(np.linspace(motion.rests_from, 1.0, 5))
+    assert (end == rest.S).all()
+    assert not np.any(rest[1:])
 
 
 def test_accelerations_of_a_trapezoid_are_one_sided() -> None:

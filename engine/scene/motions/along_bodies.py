@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from engine.scene.motions.base import Array, BetweenPlaces, Legs, Motion, Path, Reversal, Side, both_places, two_places
+from engine.scene.motions.minimum_jerk import MinimumJerk
 from engine.scene.motions.of_joints import AMPLITUDE, CONSTANT, PHASE, RATE, START, Number, blank, spline_pieces
 from engine.scene.motions.point_to_point import PointToPoint, TimedMove
 from engine.study_file.checks import Check, on_body
@@ -320,7 +321,7 @@ class Sliding(Motion):
         return Path(np.full_like(tau, self.start), np.zeros_like(tau), np.zeros_like(tau))
 
 
-ALL = (Cruise, OutAndBack, Sinusoidal, Waypoints, PointToPoint, TimedMove, Sliding)
+ALL = (Cruise, OutAndBack, Sinusoidal, Waypoints, PointToPoint, TimedMove, MinimumJerk, Sliding)
 MOTIONS = kinds("motion", "wanderlast.motions", Motion, *ALL)
 AnyMotion = Annotated[Motion, KindOf("motion", MOTIONS)]
 

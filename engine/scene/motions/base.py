@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import BeforeValidator
+from pydantic import BeforeValidator, Field
 
-from engine.study_file.checks import Check
+from engine.study_file.checks import Check, on_body
 from engine.study_file.spec import Noun, SpecOfKind
-from engine.study_file.units import Length
+from engine.study_file.units import Length, Time
 
 if TYPE_CHECKING:
     from engine.scene.motions.of_joints import Number
@@ -192,6 +192,29 @@ class BetweenPlaces(Motion):
 
     def range(self) -> tuple[float, float]:
         return min(self.start, self.end), max(self.start, self.end)
+
+
+class FromRestToRest(BetweenPlaces):
+    """From rest at the start to rest at the end, then `dwell` seconds of rest there. tau = 1 is all of it."""
+
+    ends = ("start", "end")
+    in_pieces = True
+    kind: str
+    dwell: Time = Field(default=0.0, ge=0)
+
+    @property
+    @abstractmethod
+    def seconds(self) -> float:
+        """How long it moves, s."""
+
+    @property
+    def time_scale(self) -> float:
+        return self.seconds + self.dwell
+
+    def checks(self, here: str, length: str) -> list[Check]:
+        start, end = f"{here}.start", f"{here}.end"
+        what = f"a {self.kind} path must stay on its body"
+        return [two_places(start, end), *(on_body(key, (key, length), what) for key in (start, end))]
 
 
 def both_places(number: Number) -> tuple[Array, Array]:

@@ -135,6 +135,18 @@ class TimedMove(TimeMotion):
         return timed_pieces(number("start"), number("end"), number("time"))
 
 
+class MinimumJerk(TimeMotion):
+    """From rest at the start to rest at the end in so many seconds by the polynomial of least squared jerk."""
+
+    kind: Literal["minimum-jerk"]
+    start: Dimensionless = 0.0
+    end: Dimensionless
+    time: Time = Field(gt=0)
+
+    def pieces(self, number: Number) -> Array:
+        return minimum_jerk_pieces(number("start"), number("end"), number("time"))
+
+
 class Points(TimeMotion):
     """The C2 cubic spline through values at times, at rest at both ends; it stays at the last."""
 
@@ -174,6 +186,7 @@ MoveTurn = _of_a_joint(
     jerk=(Annotated[AngularJerk, Field(gt=0)] | None, None),
 )
 TimedTurn = _of_a_joint(TimedMove, "Turn", start=(Angle, 0.0), end=(Angle, ...))
+SmoothTurn = _of_a_joint(MinimumJerk, "Turn", start=(Angle, 0.0), end=(Angle, ...))
 PointsTurn = _of_a_joint(Points, "Turn", values=(Annotated[Several[Angle], TWO_OR_MORE], ...))
 SteadySlide = _of_a_joint(Steady, "Slide", start=(Length, 0.0), rate=(Speed, ...))
 SwingSlide = _of_a_joint(Swing, "Slide", centre=(Length, 0.0), amplitude=(Length, ...))
@@ -188,11 +201,12 @@ MoveSlide = _of_a_joint(
     jerk=(Annotated[Jerk, Field(gt=0)] | None, None),
 )
 TimedSlide = _of_a_joint(TimedMove, "Slide", start=(Length, 0.0), end=(Length, ...))
+SmoothSlide = _of_a_joint(MinimumJerk, "Slide", start=(Length, 0.0), end=(Length, ...))
 PointsSlide = _of_a_joint(Points, "Slide", values=(Annotated[Several[Length], TWO_OR_MORE], ...))
 
 _TURNING, _SLIDING = "motion of a joint that turns", "motion of a joint that slides"
-_TURNS = SteadyTurn, SwingTurn, SpinUpTurn, PointsTurn, MoveTurn, TimedTurn
-_SLIDES = SteadySlide, SwingSlide, SpinUpSlide, PointsSlide, MoveSlide, TimedSlide
+_TURNS = SteadyTurn, SwingTurn, SpinUpTurn, PointsTurn, MoveTurn, TimedTurn, SmoothTurn
+_SLIDES = SteadySlide, SwingSlide, SpinUpSlide, PointsSlide, MoveSlide, TimedSlide, SmoothSlide
 TURNING = kinds(_TURNING, "wanderlast.turning_motions", TimeMotion, *_TURNS)
 SLIDING = kinds(_SLIDING, "wanderlast.sliding_motions", TimeMotion, *_SLIDES)
 COURSES = kinds("course of a load", "wanderlast.courses", TimeMotion, Steady, Swing, Points)
@@ -222,6 +236,15 @@ def move_pieces(start: Array, end: Array, number: Number) -> Array:
 def timed_pieces(start: Array, end: Array, time: Array) -> Array:
     """(V, pieces, 10) of moves between places (V,) in times (V,) s."""
     return move_pieces(start, end, reached_in(np.abs(end - start), time).__getitem__)
+
+
+def minimum_jerk_pieces(start: Array, end: Array, time: Array) -> Array:
+    """(V, 2, 10) of moves of least jerk between places (V,) in times (V,) s, and rests at their ends."""
+    found = blank(start, 2)
+    found[:, 0, CONSTANT], found[:, 1, START], found[:, 1, CONSTANT] = start, time, end
+    for power, factor in ((3, 10.0), (4, -15.0), (5, 6.0)):
+        found[:, 0, CONSTANT + power] = factor * (end - start) / time**power
+    return found
 
 
 def spline_pieces(number: Number, count: int, key: str) -> Array:

@@ -12,24 +12,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field
 
-from engine.scene.motions.base import Array, BetweenPlaces, Path, Side, both_places, two_places
+from engine.scene.motions.base import Array, FromRestToRest, Path, Side, both_places
 from engine.scene.motions.of_joints import Number, move_pieces, reached_in, timed_pieces
 from engine.scene.motions.profile import PHASES, Profile, profile
-from engine.study_file.checks import Check, on_body
 from engine.study_file.units import Acceleration, Jerk, Speed, Time
 
 
-class FromRestToRest(BetweenPlaces):
-    """From rest at the start to rest at the end, then `dwell` seconds of rest there. tau = 1 is all of it."""
-
-    ends = ("start", "end")
-    in_pieces = True
-    kind: str
-    dwell: Time = Field(default=0.0, ge=0)
+class InPhases(FromRestToRest):
+    """By a profile of constant jerks."""
 
     @property
-    def time_scale(self) -> float:
-        return self._move.duration + self.dwell
+    def seconds(self) -> float:
+        return self._move.duration
 
     @property
     def max_speed(self) -> float:
@@ -38,11 +32,6 @@ class FromRestToRest(BetweenPlaces):
     @property
     def rests_from(self) -> float:
         return float(self._bounds[-1])
-
-    def checks(self, here: str, length: str) -> list[Check]:
-        start, end = f"{here}.start", f"{here}.end"
-        what = f"a {self.kind} path must stay on its body"
-        return [two_places(start, end), *(on_body(key, (key, length), what) for key in (start, end))]
 
     def breaks(self) -> Array:
         """Where its phases meet: there the acceleration jumps or bends."""
@@ -102,7 +91,7 @@ class FromRestToRest(BetweenPlaces):
         return _tables(self._move)[1] / self.time_scale
 
 
-class PointToPoint(FromRestToRest):
+class PointToPoint(InPhases):
     """Within limits of speed, acceleration and jerk. Without a jerk the speed is a trapezoid. Where the way is too
     short for the speed, or the speed for the acceleration, these are not reached (`profile`).
 
@@ -134,7 +123,7 @@ class PointToPoint(FromRestToRest):
         return profile(abs(self.end - self.start), self.speed, self.acceleration, jerk)
 
 
-class TimedMove(FromRestToRest):
+class TimedMove(InPhases):
     """In so many seconds, the jerk constant in each quarter of them: over a way D in T it reaches a speed of 2 D/T, an
     acceleration of 8 D/T^2 and a jerk of 32 D/T^3.
 

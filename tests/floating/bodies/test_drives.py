@@ -113,7 +113,7 @@ def test_sensors_of_drives_have_a_joint_and_no_place(sensor: Any) -> None:
         driven([TURNS | {"motion": SWING}], sensor)
 
 
-IN_TIME = {"kind": "timed-move", "time": 0.3}
+IN_TIME, SMOOTH = ({"kind": kind, "time": 0.3} for kind in ("timed-move", "minimum-jerk"))
 
 
 @pytest.mark.parametrize("jerk", [None, 60.0])
@@ -135,10 +135,21 @@ def test_a_joint_moves_from_point_to_point_as_a_carriage_does(jerk: float | None
         assert torque[-1] == pytest.approx(0.0, abs=1e-12)
 
 
-def test_a_joint_moves_in_a_time() -> None:
-    """The torque by the acceleration that rises and falls by a constant jerk in each quarter, in variants of their
-    own."""
-    move = {"kind": "timed-move", "start": 0.2, "end": -0.7, "time": 1.0}
+def by_quarters(part: np.ndarray) -> np.ndarray:
+    """The acceleration over its largest, 8 D/T^2, where the jerk is constant in each quarter."""
+    return np.interp(part, [0.0, 0.25, 0.75, 1.0], [0.0, 1.0, -1.0, 0.0])
+
+
+def of_least_jerk(part: np.ndarray) -> np.ndarray:
+    """The same of the polynomial of least jerk, over 8 D/T^2 too."""
+    x = np.minimum(part, 1.0)
+    return 60.0 * x * (1.0 - x) * (1.0 - 2.0 * x) / 8.0
+
+
+@pytest.mark.parametrize(("kind", "shape"), [("timed-move", by_quarters), ("minimum-jerk", of_least_jerk)])
+def test_a_joint_moves_in_a_time(kind: str, shape: Any) -> None:
+    """The torque by the acceleration, in variants of their own."""
+    move = {"kind": kind, "start": 0.2, "end": -0.7, "time": 1.0}
     study = driven([TURNS | {"motion": move}], TORQUE, gravity=0.0)
     seconds = np.array([0.6, 1.2])
     values = VariantValues(study, {"frame.arm.joints.0.motion.time": seconds}, 2)
@@ -147,11 +158,11 @@ def test_a_joint_moves_in_a_time() -> None:
     for v, time in enumerate(seconds):
         part = found.times[v] / time
         most = 8.0 * -0.9 / time**2
-        wanted = inertia * most * np.interp(part, [0.0, 0.25, 0.75, 1.0], [0.0, 1.0, -1.0, 0.0])
+        wanted = inertia * most * shape(part)
         assert found.history[v, :, 0] == pytest.approx(wanted, abs=1e-9)
 
 
-@pytest.mark.parametrize("more", [{"kind": "point-to-point", "speed": 1.0, "acceleration": 8.0}, IN_TIME])
+@pytest.mark.parametrize("more", [{"kind": "point-to-point", "speed": 1.0, "acceleration": 8.0}, IN_TIME, SMOOTH])
 def test_a_joint_whose_ends_are_one_stands_still(more: dict[str, Any]) -> None:
     move = {"start": 0.2, "end": 0.2} | more
     model, marched = steps(driven([TURNS | {"motion": move}], TORQUE), 0.5, 50)
