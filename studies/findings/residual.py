@@ -16,7 +16,7 @@ from studies.findings.amplification import only_rounding, sizes
 from studies.findings.beyond import LIMITED, AskedOfRest, Limits, in_turns, out_of_reach, where_beyond
 from studies.findings.effects import by_effect, told_both_ways, told_effects
 from studies.results.axes import DIRECTION, VARIANT, Axis
-from studies.results.findings_common import in_words
+from studies.results.findings_common import in_words, while_held
 from studies.results.formatting import ROUNDING, counted, listed, once, quantity
 from studies.results.places import Index, chosen, extreme
 from studies.results.results import Results
@@ -165,8 +165,8 @@ def _until(results: Results, sensors: Sequence[str]) -> str:
     lost = int((np.isnan(Times.until_all(results, sensors).values) & results.with_values).sum())
     of = counted(int(results.with_values.sum()), "variant")
     rest = f"; {lost:,} of {of} {'have' if lost > 1 else 'has'} not settled when the run ends"
-    until = f"Until {f'all of {names} have' if len(sensors) > 1 else f'{names} has'} settled, "
-    return f"{until}{shortest}{rest if lost else ''}"
+    until = f"{while_held(results)}until {f'all of {names} have' if len(sensors) > 1 else f'{names} has'} settled, "
+    return f"{until[0].upper()}{until[1:]}{shortest}{rest if lost else ''}"
 
 
 def most_ringing(results: Results) -> list[Index]:
@@ -189,7 +189,7 @@ def _residual(results: Results, sensor: str, asked: AskedOfRest) -> str:
     doubt = absolute_errors(results, f"{sensor}_residual")
     error = float(doubt[place])  # parts of a static value mislead here
     said = (
-        f"{sensor}: after {since(results)} it still swings by up to {quantity(size, units)}"
+        f"{sensor}: {while_held(results)}after {since(results)} it still swings by up to {quantity(size, units)}"
         f"{told_error(error, size, units)}{in_words(results, place)}"
     )
     axis = next(iter(by_effect(results, values)), None)

@@ -20,6 +20,8 @@ from studies.reporting.summary import Range, asked
 from studies.results.results import Results
 from studies.runs.identity import SOURCES
 
+LAST_DIGITS = 1e-14  # of a value: what sums in another order differ by, and no error that is told
+
 
 class Difference(NamedTuple):
     """A result in both archives: its values in the first and second where they exceed their errors the most, or where
@@ -137,7 +139,9 @@ def _differences(first: Results, second: Results, names: list[tuple[Range, str]]
         old, new = (_of(results, found).values.astype(np.float64) for results in (first, second))
         apart = np.where((old == new) | (np.isnan(old) & np.isnan(new)), 0.0, np.abs(new - old))
         allowed = _allowed(first, second, found, apart)
-        beyond, unknown = np.isnan(apart) | (apart > allowed), (apart > 0.0) & np.isnan(allowed)
+        rounding = LAST_DIGITS * np.fmax(np.abs(old), np.abs(new))
+        beyond = np.isnan(apart) | ((apart > allowed) & (apart > rounding))
+        unknown = (apart > rounding) & np.isnan(allowed)
         # np.argmax takes a NaN, a number in one of them alone, for the largest
         most = np.argmax(np.where(beyond, apart - np.nan_to_num(allowed), 0.0) if beyond.any() else apart)
         place = tuple(map(int, np.unravel_index(int(most), apart.shape))) if apart.ndim else ()

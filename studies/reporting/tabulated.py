@@ -49,12 +49,13 @@ def export(
 ) -> Path:
     """Write the table of a dataset as a CSV file, or as Parquet, as the command `export` does; its path.
 
-    results: one or some of those that it has beside the swept numbers and the status, all where none is named. Raises
+    results: one or some of those that it has beside the swept numbers and the status, with commas between them or as a
+    list; all where none is named. Raises
     as `write_table`, and BadInput for what is no whole dataset of a study.
     """
     found = Results.of(dataset)
     kind_of(found.study)  # which declares its results
-    write_table(found, Path(path), [results] if isinstance(results, str) else results, overwrite=overwrite)
+    write_table(found, Path(path), results.split(",") if isinstance(results, str) else results, overwrite=overwrite)
     return Path(path)
 
 

@@ -14,7 +14,9 @@ from studies.kinds.double_peak import KIND as DOUBLE_PEAK
 from studies.moving.findings import others, sliding
 from studies.reporting import answers
 from studies.results.results import Results
+from tests.engine.build import fixed
 from tests.floating.scenes import sliding_mass
+from tests.kinds.test_residual import stops
 from tests.studies import scenes
 
 OPENED = 2  # of four variants
@@ -37,6 +39,16 @@ def test_other_sensors_of_a_passage_are_compared_while_the_contact_holds() -> No
     dataset["dynamic_amplification"].values[0] = 2.0
     assert "a dynamic amplification of 1.1." in "\n".join(answers.answer(dataset))
     assert "(up to 2) exceeds" in "\n".join(answers.answer(dataset))
+
+
+def test_what_swings_on_after_a_stop_is_told_while_the_contact_holds() -> None:
+    """Also how long all take to settle where motions end at different times."""
+    sensor = {"midspan": fixed(0.5) | {"settling_band": 0.02}}
+    dataset = studies.run(stops(sensor=sensor, output={"residual": True}))
+    dataset["status"].values[np.argmax(dataset["midspan_residual"].values)] = Status.SEPARATED
+    said = answers.answer(dataset)
+    assert any(text.startswith("midspan: while the contact holds, after the stop it still swings") for text in said)
+    assert any(text.startswith("While the contact holds, until midspan has settled, ") for text in said)
 
 
 def test_a_limit_that_is_exceeded_where_the_contact_opens_alone_is_told() -> None:

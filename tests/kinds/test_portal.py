@@ -320,4 +320,7 @@ def test_results_of_robots_and_rails_are_in_tables_and_compared(found: Any) -> N
     other["error_moving"] = 1.5 * other["error_moving"]
     told = compared(results, Results.of(other))
     assert not told.agree and compared(results, results).agree
+    rounded = found.copy(deep=True)
+    rounded["error_moving"] = (1.0 + 1e-15) * rounded["error_moving"]  # as sums in another order
+    assert compared(results, Results.of(rounded)).agree
     assert {one.name for one in told.differences if one.beyond} == {"error_moving portal", "error_moving hanging"}
