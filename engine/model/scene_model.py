@@ -94,12 +94,11 @@ class SceneModel:
 
     @cached_property
     def corrected(self) -> Counts:
-        """Numbers of the ties that a residual coordinate moves (`attachment.residual_rows`): masses that push, and
-        their pushes."""
+        """Numbers of the ties that a residual coordinate moves (`attachment.residual_rows`): masses, and their pushes
+        along and across their tracks."""
         if not self.numerics.static_correction:
             return np.zeros(0, dtype=np.int64)
-        own = {push.carriage for push in self.pushes if self.carriages[push.carriage].inertia == "mass"}
-        masses = sorted(r for r in own if not self.springs_of(r))
+        masses = [r for r, carriage in enumerate(self.carriages) if carriage.inertia == "mass"]
         return np.array([*masses, *range(self.first_push, self.ties)], dtype=np.int64)
 
     @property

@@ -37,9 +37,8 @@ def steps(study: Study, overrides: Mapping[str, Any], asked: Question, work: Wor
     errors, seconds = np.full((*shape, len(QUANTITIES)), np.nan), np.full(shape, np.nan)
     marched = {s: precision.with_scheme(model, s) if s in MARCHED else model for s in asked.schemes}
     for n, count in enumerate(asked.step_counts):
-        shared: dict[Any, Any] = {}
         for i, scheme in enumerate(asked.schemes):
-            tables = precision.tables_of(marched[scheme], count, shared)
+            tables = precision.tables_of(marched[scheme], count)
             found = precision.run_scheme(tables, scheme, work)
             errors[i, n] = reference.errors(found)
             if not found.diverged:
@@ -103,9 +102,8 @@ def modes(study: Study, overrides: Mapping[str, Any], asked: Question, work: Wor
             [precision.with_correction(precision.with_scheme(bare, s), c) for c in (False, True)] for s in schemes
         ]
         for n, count in enumerate(asked.step_counts):
-            shared: dict[Any, Any] = {}
             for i, c in np.ndindex(len(schemes), 2):
-                tables = precision.tables_of(models[i][c], count, shared)
+                tables = precision.tables_of(models[i][c], count)
                 found = precision.run_scheme(tables, schemes[i], work)
                 errors[m, c, i, n] = reference.errors(found)
                 if c and not found.diverged:

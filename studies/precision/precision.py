@@ -7,7 +7,7 @@ over time over the weight, on 0-98 % of the span.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -23,8 +23,6 @@ from engine.march.tables import SceneTables
 from engine.methods.comparison import COMPARISON, march_comparison, prepare_comparison
 from engine.methods.ode import ModalEquations, Solution
 from engine.model.scene_model import SceneModel, build_model
-from engine.model.station_path import Along, ways
-from engine.model.timeline import Segment
 from engine.observation.histories import counts_shown
 from engine.scene.study import Study
 from engine.scene.variants import VariantValues
@@ -85,11 +83,12 @@ class Reference:
 
 
 def scene_model(study: Study, overrides: Mapping[str, Any], modes: int | None = None) -> SceneModel:
-    """The model of a study with other values at dotted keys, and so many modes of its one body. Raises BadInput."""
+    """The model of a study with other values at dotted keys, and so many modes of its one body, without the static part
+    of those that are left out. Raises BadInput."""
     changed = study.with_values(overrides) if overrides else study
     if modes is not None:
         changed = changed.with_values({f"body.{next(iter(changed.carriage.values())).on}.modes": modes})
-    return build_model(changed, {}, {})
+    return with_correction(build_model(changed, {}, {}), False)
 
 
 def with_scheme(model: SceneModel, scheme: str) -> SceneModel:
@@ -102,22 +101,9 @@ def with_correction(model: SceneModel, corrected: bool) -> SceneModel:
     return replace(model, numerics=model.numerics._replace(static_correction=corrected))
 
 
-@dataclass(eq=False)
-class SharedTables(SceneTables):
-    """Tables whose ways are shared by all schemes of one body and number of steps: they take most of the time."""
-
-    shared: dict[Any, Along] = field(default_factory=dict)
-
-    def _ways(self, segments: Sequence[Segment]) -> Along:
-        key = tuple((segment.start, segment.end, segment.steps, segment.active) for segment in segments)
-        if key not in self.shared:
-            self.shared[key] = ways(self.model, *segments)
-        return self.shared[key]
-
-
-def tables_of(model: SceneModel, steps: int, shared: dict[Any, Along] | None = None) -> SceneTables:
-    """The tables of a scene, cut so that a Richardson pair can halve them. shared: ways of the same body and steps."""
-    return SharedTables(model, steps, "whole", refinement=2, shared={} if shared is None else shared)
+def tables_of(model: SceneModel, steps: int) -> SceneTables:
+    """The tables of a scene, cut so that a Richardson pair can halve them."""
+    return SceneTables(model, steps, "whole", refinement=2)
 
 
 def run_scheme(tables: SceneTables, scheme: str, work: Work) -> Run:

@@ -104,7 +104,7 @@ class Ground:
             gravity=self.study.gravity,
             body={self.body: self.study.data["body"][self.body] | {"modes": modes}},
             carriage={CARRIAGE: {"on": self.body, "kind": "mass", "mass": 1.0, "motion": dict(motion)}},
-            solver=dict(solver),
+            solver={"static_correction": False} | dict(solver),  # theory is of the kept modes
         )
         return MapScene(study, build_model(study, {}, {}))
 

@@ -40,7 +40,7 @@ STUDIES: dict[str, Study] = {
     "passages": sweep(),
     "tight": sweep(2e-3),
     "wide": sweep(5e-2),
-    "swept tolerance": sweep(sweep=SPEEDS | WEIGHTS | {"wanted": {"of": TOLERANCE, "values": [2e-3, 1e-2, 5e-2]}}),
+    "swept tolerance": sweep(sweep=SPEEDS | WEIGHTS | {"wanted": {"of": TOLERANCE, "values": [2e-4, 2e-3, 5e-2]}}),
     "more modes than its steps need": sweep(1e-3, bed=beam(modes=MAX_MODES, damping_ratio=0.02)),
     "numbers of modes": sweep(
         bed=OPEN,

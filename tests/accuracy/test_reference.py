@@ -132,14 +132,14 @@ def test_levels_end_where_nothing_changes_any_more() -> None:
 
 
 def test_what_is_within_the_tolerance_is_not_marched_again_for_seconds() -> None:
-    """A slow shuttle of 340 kg, to whose few modes eight add by chance what they then take back; such a level is called
-    dear here."""
+    """A slow shuttle of three tons, whose next level is called dear here."""
     given = engine.load(catalogue.find_study("double-peak")).with_values(
         {
             "sweep": {},
-            "carriage.table.motion.frequency": 0.0343,
+            "carriage.table.motion.frequency": 0.1,
             "carriage.table.motion.cycles": 16,
-            "carriage.table.mass": 340,
+            "carriage.table.mass": 3000,
+            "solver.tolerance": 5e-6,
             "body.bed.damping_ratio": 0.02,
         }
     )
@@ -150,7 +150,7 @@ def test_what_is_within_the_tolerance_is_not_marched_again_for_seconds() -> None
     held = np.isfinite(tolerances(results_of(grid.asked)))
     model = grid.model(in_full(grid).numerics[closer.level[0]])
     off = differences(grid.asked, model, grid.values, found.outcome, closer.outcome)[held]
-    assert DOUBTED * 1e-3 < found.error[held].max() <= 1e-3
+    assert DOUBTED * 5e-6 < found.error[held].max() <= 5e-6
     assert np.all(off <= found.error[held])
 
 
@@ -268,13 +268,17 @@ def test_what_forces_along_a_track_leave_is_told_with_the_modes_that_matter_miss
 @pytest.mark.fault
 @pytest.mark.parametrize("modes", [8, 16, 32, MAX_MODES])
 def test_a_mass_that_is_let_go_touches_with_what_its_modes_weigh_there(modes: int) -> None:
-    """g m m_N/(m + m_N) with 1/m_N = sum of phi_n(x)^2/M_n: nothing with all modes, so that all of it is the error."""
+    """g m m_N/(m + m_N) with 1/m_N = sum of phi_n(x)^2/M_n, and omega_N^2 R of what they miss: nothing with all modes,
+    so that all of it is the error."""
     weight, place = 0.2 * 9.81, 0.2
     scene = study(beam(modes=modes), mass(0.2, cruise(place, 0.8, 0.3)), initial="rest", solver={"tolerance": 1e-2})
     found = studies.run(scene)
-    shapes = 2.0 * np.sin(np.arange(1, modes + 1) * np.pi * place) ** 2
+    omega = (np.arange(1, modes + 1) * np.pi) ** 2
+    shapes = 2.0 * np.sin(np.sqrt(omega) * place) ** 2
+    missed = (place * (1.0 - place)) ** 2 / 3.0 - np.sum(shapes / omega**2)
     least = float(found.car_contact_force_min)
-    assert least == pytest.approx(weight / (1.0 + 0.2 * shapes.sum()), rel=1e-9)
+    light = shapes.sum() + omega[-1] ** 2 * missed
+    assert least == pytest.approx(weight / (1.0 + 0.2 * light), rel=1e-9)
     error = float(found.estimated_error.sel(result="car_contact_force_min"))
     assert np.isnan(error) if modes == MAX_MODES else least / weight <= error <= 5.0 * least / weight
 
@@ -304,9 +308,9 @@ def test_levels_have_more_and_more_of_the_modes_that_loads_excite() -> None:
 def test_errors_of_what_a_head_beside_the_axis_pushes_are_told() -> None:
     """Of a portal whose head brakes by a lever half of the errors by the first three levels were told too small, up to
     4.6 times, as long as the head did not feel all that few modes miss under it."""
-    sweep = {"acceleration": {"of": "carriage.head.motion.acceleration", "values": [2.0, 3.0, 5.0, 7.0]}}
+    sweep = {"acceleration": {"of": "carriage.head.motion.acceleration", "values": [2.0, 3.0, 4.0, 5.0, 6.0, 7.0]}}
     told, observed = np.zeros(0), np.zeros(0)
-    for wanted in (1e-3, 3e-3):
+    for wanted in (1e-2, 2e-2, 3e-2):
         given = engine.load(catalogue.find_study("machine-tool"))
         plan = make_plan(given.with_values({"sweep": sweep, "solver.tolerance": wanted}))
         found = audit(plan, np.arange(plan.size))

@@ -6,7 +6,10 @@ accelerations and the ties' forces together:
 
     M x'' + C x' + K x = f + P F
     contact:  F + k (P^T x + level + R (F, P0)) + c d/dt (P^T x + level) = 0, beyond P0, its load on level ground
-    mass:     F + m D^2(p^T x + level) = m g;  rigid contact:  D^2(P^T x + level) = 0
+    mass:     F + m (D^2(p^T x + level) + y'') = m g;  rigid contact:  D^2(P^T x + level) = 0
+
+y of every mass, a coordinate of its own, is what the kept modes miss of the deflection under it by all masses:
+    y'' + 2 zeta omega y' + omega^2 y = omega^2 R F, omega the highest frequency kept
 """
 
 from dataclasses import dataclass
@@ -16,6 +19,7 @@ import numpy as np
 
 from engine.bodies.build import build_body
 from engine.bodies.modal.modal_body import ModalBody
+from engine.model.lane_table import RESIDUAL_DAMPING
 from engine.scene.study import Study
 from results_schema.arrays import Array
 
@@ -91,6 +95,11 @@ class Twin:
         self._between: dict[tuple[str, Place, Place], float] = {}
         self.ties = [tie for name, spec in study.carriage.items() for tie in self._ties(name, spec)]
         self.dead = np.array([tie.at_rest if tie.rides else 0.0 for tie in self.ties])
+        self.heavy = [t for t, tie in enumerate(self.ties) if tie.mass > 0.0 and self.residual]
+        for last in (self.part[self.ties[t].below].stop - 1 for t in self.heavy):
+            highest = self.omega[last]
+            self.rates = np.append(self.rates, self.rates[last] + 2.0 * RESIDUAL_DAMPING * highest)
+            self.omega = np.append(self.omega, highest)
 
     def _ties(self, name: str, spec: Any) -> list[Tie]:
         if spec.kind != "body":
@@ -179,6 +188,9 @@ class Twin:
                 m = tie.mass
                 a[t], v[t], x[t], loads[:, t] = m * p0, 2.0 * m * ds * p1, m * (ds**2 * p2 + dds * p1), p0
                 right.append(on * tie.at_rest - m * (ds**2 * curve + dds * tilt))
+        for y, t in enumerate(self.heavy, start=n - len(self.heavy)):
+            a[t, y] = self.ties[t].mass
+            loads[y, self.heavy] = self.omega[y] ** 2 * missed[t, self.heavy]
         return Law(a, v, x, own, np.array(right), loads, dead)
 
     def holds(self, where: Where) -> tuple[list[Hold], list[Hold]]:

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
+from engine.model.lane_table import RESIDUAL_DAMPING
 from engine.scene.study import Study
 from tests.naive import motions, ode
 from tests.naive import newmark as naive
@@ -243,13 +244,23 @@ def scene_of(study: Study, body: str, end: float) -> tuple[Bed, Scene, tuple[str
     modes = bed.omega.size
     sprung = [name for name in riders if study.carriage[name].kind == "oscillator"]  # type: ignore[attr-defined]
     numbers = {name: modes + number for number, name in enumerate(sprung)}
-    phi = padded_by(bed.phi, len(sprung))
-    loads = tuple(load_of(study, name, bed.length, end, numbers.get(name, 0)) for name in riders)
+    felt = 0
+    loads = [load_of(study, name, bed.length, end, numbers.get(name, 0)) for name in riders]
+    if study.solver.static_correction:
+        for place in (place for place, load in enumerate(loads) if load.convective_mass > 0.0):
+            loads[place] = replace(loads[place], residual=modes + len(sprung) + felt)
+            felt += 1
+    phi = padded_by(bed.phi, len(sprung) + felt)
     dampers = tuple(Damper(phi(at, 0), c, at) for at, c in bed.dampers)
     table: Any = study.body[body]
-    zeta = np.append(damping_of(table.damping_ratio, bed.omega), np.zeros(len(sprung)))
+    zeta = damping_of(table.damping_ratio, bed.omega)
+    own = zeta[-1] + RESIDUAL_DAMPING, bed.omega[-1]
+    zeta, omega = (
+        np.concatenate([of, np.zeros(len(sprung)), np.full(felt, last)])
+        for of, last in zip((zeta, bed.omega), own, strict=True)
+    )
     missed = partial(bed.missed, derivative=0) if study.solver.static_correction else None
-    scene = Scene(phi, np.append(bed.omega, np.zeros(len(sprung))), zeta, loads, dampers, missed=missed)
+    scene = Scene(phi, omega, zeta, tuple(loads), dampers, missed=missed)
     own = bool(table.own_weight)
     if study.start == "equilibrium":
         return bed, scene, riders, scenes.equilibrium(at_rest(scene, bed, study.gravity), 0.0)

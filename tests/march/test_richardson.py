@@ -88,7 +88,7 @@ def errors(name: str, scheme: str, steps: int) -> Mapping[str, float]:
 @pytest.mark.parametrize("name", SCENES)
 def test_order_is_four(name: str) -> None:
     """Halving the step divides the error of every history by about 16, that of one march by about 4."""
-    steps = 900
+    steps = 900 if name in SMOOTH else 600
     one, two = errors(name, "richardson", steps), errors(name, "richardson", 2 * steps)
     for sensor in SENSORS:
         order = math.log2(one[sensor] / two[sensor])
@@ -129,7 +129,7 @@ def test_automatic_steps_hold_the_tolerance() -> None:
 
 def test_extremes_lie_between_stations() -> None:
     """Against a march of 32 times as many steps: values, places, rms, contact forces, separation."""
-    bed, car = beam(modes=4, damping_ratio=0.01), mass(1.0, cruise(0.0, 1.0, 0.55 * math.pi))
+    bed, car = beam(modes=4, damping_ratio=0.01), mass(1.0, cruise(0.0, 1.0, 0.5 * math.pi))
     given = study(bed, car, sensor={"mid": fixed(0.5), "m": fixed(0.3)})
     exact = run(with_solver(given, scheme="fox-goodwin", steps=51200))
     ds = run(with_solver(given, scheme="richardson", steps=1600))

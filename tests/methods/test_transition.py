@@ -67,7 +67,9 @@ def passage(twin: Scene, name: str, times: Array) -> Array:
 
 def scene(name: str = "average", motion: dict[str, Any] | None = None, **bed: Any) -> tuple[Study, SceneModel]:
     study = build.study(
-        build.beam(modes=MODES, **bed), build.mass(0.4, motion or build.cruise(0.0, 1.0, 1.0)), solver=SCHEMES[name]
+        build.beam(modes=MODES, **bed),
+        build.mass(0.4, motion or build.cruise(0.0, 1.0, 1.0)),
+        solver=SCHEMES[name] | {"static_correction": False},
     )
     return study, build_model(study, {}, {})
 

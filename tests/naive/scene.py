@@ -19,6 +19,11 @@ deflection under it, R F of the contact forces F of all loads and dampers, its s
 
     S = -k (r.q + R F) - c (r.q' + s' phi'.q)
 
+A mass may feel it by a coordinate of its own, y, by which its place is phi.q + y, and which forces of such masses
+drive, of a sprung one those of its wheel and of the sprung weight:
+
+    y'' + 2 zeta omega y' + omega^2 y = omega^2 R F
+
 Nothing here is clever on purpose.
 """
 
@@ -83,7 +88,7 @@ class Load:
 
     mass: kg in M(t). convective_mass: kg in C(t) and K(t); equal to mass, or 0 where convective terms are left out.
     weight: N along gravity. arrival_speed: vertical speed in m/s before the load touches the body. sprung: a mass on a
-    spring above it.
+    spring above it. residual: the number of its y, whose frequency and damping stand among those of the modes.
     """
 
     phases: tuple[Phase, ...]
@@ -92,6 +97,7 @@ class Load:
     convective_mass: float = 0.0
     arrival_speed: float = 0.0
     sprung: Sprung | None = None
+    residual: int | None = None
 
     @property
     def enter(self) -> float:
@@ -146,8 +152,9 @@ class Scene:
     """A body of N modes and what acts on it.
 
     phi(s, derivative) -> (N,), unit modal mass; omega (N,) rad/s; zeta (N,); own_weight (N,) modal force of gravity.
-    Where masses are sprung, N counts them too: phi and omega are zero there. missed(x, s): m at x per N at s that modes
-    left out would add; None where nothing is. modal_mass (N,): of modes that have another than unity.
+    Where masses are sprung, or have a y, N counts these too: phi is zero there, and omega of what is sprung.
+    missed(x, s): m at x per N at s that modes left out would add; None where nothing is. modal_mass (N,): of modes
+    that have another than unity.
     """
 
     phi: Shape
@@ -198,6 +205,8 @@ def wheels(scene: Scene, t: float, side: Side) -> Forces:
         phase = load.phase(t, side)
         if phase is not None:
             row, rate_row, position_row = convective_rows(scene.phi, phase, t)
+            if load.residual is not None and scene.missed is not None:
+                row = row + np.eye(len(row))[load.residual]
             found.a[j], found.rest[j] = -load.mass * row, load.weight
             found.v[j], found.q[j] = -load.convective_mass * rate_row, -load.convective_mass * position_row
     return found
@@ -225,6 +234,19 @@ def springs(scene: Scene, t: float, side: Side, pressing: Forces) -> Forces:
     return Forces(*together)
 
 
+def driven(scene: Scene, t: float, side: Side, j: int) -> Array:
+    """What a force of a load moves: phi, and of the masses with a y, where it has one itself, omega^2 R."""
+    phase, load = scene.loads[j].phase(t, side), scene.loads[j]
+    if phase is None:
+        return np.zeros(len(scene.omega))
+    found = scene.phi(phase.s(t), 0).copy()
+    for other in scene.loads:
+        there = other.phase(t, side)
+        if scene.missed is not None and load.residual is not None and other.residual is not None and there is not None:
+            found[other.residual] = scene.omega[other.residual] ** 2 * scene.missed(there.s(t), phase.s(t))
+    return found
+
+
 def _none(scene: Scene) -> Forces:
     shape = len(scene.loads), len(scene.omega)
     return Forces(np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape[0]))
@@ -246,11 +268,13 @@ def system(scene: Scene, t: float, side: Side) -> System:
             row, _ = load.sprung.rows(scene, phase, t)
             mass[load.sprung.number, load.sprung.number] = load.sprung.mass
             force[load.sprung.number] += load.sprung.weight
-        below = row if phase is None else scene.phi(phase.s(t), 0)
+        below = row if phase is None else driven(scene, t, side, j)
         mass = mass - np.outer(below, w.a[j]) - np.outer(row, s.a[j])
         damping = damping - np.outer(below, w.v[j]) - np.outer(row, s.v[j])
         stiffness = stiffness - np.outer(below, w.q[j]) - np.outer(row, s.q[j])
         force = force + below * w.rest[j] + row * s.rest[j]
+        if load.sprung is not None and phase is not None:
+            force = force + (below - scene.phi(phase.s(t), 0)) * load.sprung.weight
     return System(mass, damping, stiffness, force)
 
 

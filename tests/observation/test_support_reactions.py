@@ -24,7 +24,7 @@ from tests.bodies.frames import body
 from tests.bodies.models import Files, in_process
 from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study, swing
 from tests.observation.plane_frame import PlaneFrame
-from tests.observation.test_off_track import GRAVITY, HEIGHT, PLACES, PORTAL, SPAN, WEIGHT, one_span, statics
+from tests.observation.test_off_track import FINER, GRAVITY, HEIGHT, PLACES, PORTAL, SPAN, WEIGHT, one_span, statics
 from tests.observation.test_off_track import study as portal_study
 from tests.unreduced.test_unreduced import apart
 
@@ -236,9 +236,9 @@ def test_marches_of_beams_agree_with_the_unreduced_model(supports: Any, places: 
 def test_marches_of_frames_agree_with_the_unreduced_model() -> None:
     car = {"car": mass(WEIGHT / GRAVITY, shuttle(0.8, 3.1, 2.0, 0.3, 1), on="portal")}
     more = {"carriage": car, "solver": {"steps": 2000, "tolerance": 0.5}, "output": {"histories": "all"}}
-    found = apart(portal_study(FEET, PORTAL | {"modes": 20}, **more))
+    found = apart(portal_study(FEET, FINER | {"modes": 20}, **more))
     assert max(found.values()) < 1e-3, found
-    loose = PORTAL | {"supports": {"a": "clamped"}, "spring": {"foot": {"node": "d", "stiffness": [0, 0, 4e6]}}}
+    loose = FINER | {"supports": {"a": "clamped"}, "spring": {"foot": {"node": "d", "stiffness": [0, 0, 4e6]}}}
     loose["spring"]["foot"]["damping"] = [0.0, 0.0, 2e4]
     feet = {name: FEET[name] for name in ("down", "pinned")}
     found = apart(portal_study(feet, loose | {"modes": 20}, **more))

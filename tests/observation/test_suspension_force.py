@@ -28,7 +28,8 @@ def crossing(sensors: dict[str, Any], **changes: Any) -> Any:
 
 
 def test_it_accelerates_the_sprung_mass_and_presses_on_the_wheel() -> None:
-    found = engine.run(crossing(READ, sweep={"mass": {"of": "carriage.car.mass", "values": MASSES}}))
+    plain = {"steps": 2000, "static_correction": False}  # accelerations are read of the kept modes alone
+    found = engine.run(crossing(READ, solver=plain, sweep={"mass": {"of": "carriage.car.mass", "values": MASSES}}))
     sprung = found.mass.values[:, None]
     spring, body, wheel, contact = (found[name].values for name in READ)
     assert np.abs(spring).max() > 0.05 * GRAVITY * MASSES[0]
@@ -49,7 +50,8 @@ def test_a_coach_on_its_wheels_is_as_many_sprung_masses() -> None:
     table = {"kind": "rigid", "length": 0.3, "mass": 2.0 * MASSES[0], "inertia": 2.0 * MASSES[0] * (0.5 * base) ** 2}
     contacts = {"front": spring | {"at": 0.15 + 0.5 * base}, "rear": spring | {"at": 0.15 - 0.5 * base}}
     coach = {"on": "bed", "kind": "body", "body": "table", "contacts": contacts, "motion": cruise(-0.1, 1.1, 0.5)}
-    bed, more = beam(modes=12), {"solver": {"steps": 2000, "tolerance": 0.5}, "output": {"histories": "all"}}
+    plain = {"steps": 2000, "tolerance": 0.5, "static_correction": False}  # which wheels of both kinds feel otherwise
+    bed, more = beam(modes=12), {"solver": plain, "output": {"histories": "all"}}
     sensors = {name: {"carriage": "coach", "contact": name, "quantity": "contact_force"} for name in ways}
     wheels = {f"{name}_wheels": mass(WHEEL, way) for name, way in ways.items()}
     sensors |= {"middle": fixed(0.5)}

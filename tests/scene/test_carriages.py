@@ -13,6 +13,7 @@ from engine.unreduced.statics import unreduced_frequencies, unreduced_statics
 from tests.engine.build import beam, cruise, fixed, force, mass, study
 
 WAY = cruise(0.0, 1.0, 0.5)
+PLAIN = {"static_correction": False}  # which a mass feels of its own forces, not of others'
 
 
 class PushedMass(Carriage):
@@ -31,7 +32,7 @@ def test_a_kind_from_elsewhere_is_a_mass_and_a_force(monkeypatch: pytest.MonkeyP
     monkeypatch.setitem(CARRIAGES.own, "pushed-mass", PushedMass)  # type: ignore[arg-type]
     pushed = {"on": "bed", "kind": "pushed-mass", "mass": 0.3, "push": 2.0, "motion": WAY}
     sensors = {"place": fixed(0.61), "moment": fixed(0.37, "bending_moment")}
-    options = {"body": {"bed": beam(modes=6)}, "sensor": sensors, "solver": {"steps": 200}}
+    options = {"body": {"bed": beam(modes=6)}, "sensor": sensors, "solver": {"steps": 200} | PLAIN}
     one = study(beam(), {"car": pushed}, **options)
     two = study(beam(), {"car": mass(0.3, WAY), "push": force(2.0, WAY)}, **options)
     found, right = engine.run(one), engine.run(two)
