@@ -42,7 +42,7 @@ RESULTS = outputs("""
         against a reference converged in both; history and extremes over the scene's largest static value, contact_force
         over the weight; NaN where it diverged and for comparison-only schemes
     total_seconds_per_variant | scene mode_count scheme step_count | s | alone nan | wall time per variant
-        as seconds_per_variant; the static correction costs nothing, as the kernels do the same work without it
+        as seconds_per_variant, with the static correction, without which a mass has one coordinate less
     total_reference_error | scene quantity | | alone nan | estimated error of the reference of `total_error`
         a third of the change from half as many modes, as errors fall with the second power at least, plus the change
         from half as many steps
