@@ -285,17 +285,13 @@ def _at_the_end(results: Results, place: Index) -> str:
     return f", an end of the swept {axis.noun}" if value in (axis.values.min(), axis.values.max()) else ""
 
 
-def _off(results: Results) -> str:
-    """Where the first carriage is when it has no place."""
-    return f" with {results.carriage_name} off its body"
-
-
 def _value(results: Results, sensor: str, place: Index) -> str:
     """The extreme of larger size of one variant, and where the carriage is then."""
     sides = {side: float(results.dataset[f"{sensor}_{side}"].values[place]) for side in ("max", "min")}
     side = max(sides, key=lambda name: abs(sides[name]))
     at = float(results.dataset[f"{sensor}_{side}_position"].values[place])
-    then = f" with {results.carriage_name} at {quantity(at, 'm')}" if np.isfinite(at) else _off(results)
+    place_then = f"at {quantity(at, 'm')}" if np.isfinite(at) else "off its body"
+    then = f" with {results.carriage_name} {place_then}"
     if (when := f"{sensor}_{side}_time") in results.dataset:
         then = f" after {quantity(float(results.dataset[when].values[place]), 's')}{then}"
     loosely = uncertainty(results, f"{sensor}_{side}", place)

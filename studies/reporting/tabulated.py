@@ -50,8 +50,7 @@ def export(
     """Write the table of a dataset as a CSV file, or as Parquet, as the command `export` does; its path.
 
     results: one or some of those that it has beside the swept numbers and the status, with commas between them or as a
-    list; all where none is named. Raises
-    as `write_table`, and BadInput for what is no whole dataset of a study.
+    list; all where none is named. Raises as `write_table`, and BadInput for what is no whole dataset of a study.
     """
     found = Results.of(dataset)
     kind_of(found.study)  # which declares its results

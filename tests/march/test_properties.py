@@ -236,6 +236,18 @@ def without_correction(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(twin.Bed, "missed", lambda self, x, s, derivative: 0.0)
 
 
+def without_residual(patch: pytest.MonkeyPatch) -> None:
+    def kept_alone(scene: scenes.Scene, t: float, side: scenes.Side, j: int) -> Array:
+        phase = scene.loads[j].phase(t, side)
+        return np.zeros(len(scene.omega)) if phase is None else scene.phi(phase.s(t), 0)
+
+    patch.setattr(scenes, "driven", kept_alone)
+
+
+def without_its_damping(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(twin, "RESIDUAL_DAMPING", 0.0)
+
+
 HALF = mass(0.5, cruise(0.0, 1.0, 0.8))
 ON_SPRINGS = {"car": mass(0.5, cruise(0.0, 1.0, 0.8)), "next": mass(0.4, cruise(0.0, 1.0, 1.0), delay=0.3)}
 TERMS: dict[str, tuple[Change, dict[str, Any], dict[str, Any]]] = {
@@ -248,6 +260,8 @@ TERMS: dict[str, tuple[Change, dict[str, Any], dict[str, Any]]] = {
     "damping": (without_damping, beam(damping_ratio=0.02), HALF),
     "damper": (without_dampers, beam(supports=SPRINGS), HALF),
     "static correction": (without_correction, beam(), force(5.0, cruise(0.0, 1.0, 0.8))),
+    "what a mass feels of missed modes": (without_residual, beam(), HALF),
+    "damping of that": (without_its_damping, beam(), HALF),
 }
 
 

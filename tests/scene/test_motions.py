@@ -2,7 +2,6 @@
 
 import math
 from itertools import pairwise
-from math import factorial
 from typing import Any
 
 import numpy as np
@@ -247,7 +246,7 @@ def test_a_move_of_least_jerk_is_the_quintic_at_rest_at_both_ends(start: float, 
     motion = MinimumJerk(kind="minimum-jerk", start=start, end=end, time=time, dwell=dwell)
     powers = np.arange(6)
     conditions = [
-        [factorial(k) / factorial(k - order) * at ** (k - order) if k >= order else 0.0 for k in powers]
+        [math.factorial(k) / math.factorial(k - order) * at ** (k - order) if k >= order else 0.0 for k in powers]
         for at in (0.0, time)
         for order in range(3)
     ]
