@@ -67,34 +67,41 @@ class Choice:
     foreseen: Cheapest
     found: Cheapest
 
-    def errors(self, variants: Counts, rung: Numbers, vibration: Array | None = None) -> Array:
-        """(R, V) estimated errors of some variants on rungs (V,); NaN where no estimate exists. vibration (V,): of
-        their marches, where it is known."""
-        return self._by(vibration).errors.errors(self._march, rung, *self._around(variants, vibration))
-
-    def held(self, variants: Counts, rung: Numbers, tighter: Array, vibration: Array | None = None) -> Array:
-        """(V,) the largest of the errors that are held, less what the study fixes, over their tolerances; tighter (V,):
-        `solver.tolerance` of the variants over the study's."""
-        return self._by(vibration).errors.worst(rung, *self._around(variants, vibration), tighter)
-
-    def again(self, variants: Counts, tighter: Array, vibration: Array) -> Numbers:
-        """(V,) the rungs of some variants of which it is known how much they vibrate."""
-        return self.found.of(*self._around(variants, vibration), tighter)
-
-    def _by(self, vibration: Array | None) -> Cheapest:
-        return self.foreseen if vibration is None else self.found
-
-    def _around(self, variants: Counts, vibration: Array | None) -> tuple[Array, Numbers]:
-        """(V, D) weighted places and (V, k) numbers of pilots, as kernels take them."""
+    def around(self, variants: Counts, vibration: Array | None = None) -> Around:
+        """What pilots tell of some variants. vibration (V,): of their marches, where it is known."""
         places = coordinates(self.cases, variants) * self.weights
         if vibration is not None:
             places = np.concatenate([places, vibration[:, None]], axis=1)
-        return places, self.neighbours[variants].astype(np.int32)
+        by = self.foreseen if vibration is None else self.found
+        return Around(by, self._march, places, self.neighbours[variants].astype(np.int32))
 
     @cached_property
     def _march(self) -> NDArray[np.int32]:
         """(columns x cuts, P) the march that tells of a rung."""
         return self.measured.march.reshape(-1, self.measured.march.shape[2])
+
+
+class Around(NamedTuple):
+    """Some variants among pilots: weighted places (V, D), and numbers of neighbours (V, k) that tell by their marches
+    (columns x cuts, P)."""
+
+    by: Cheapest
+    march: NDArray[np.int32]
+    places: Array
+    neighbours: Numbers
+
+    def errors(self, rung: Numbers) -> Array:
+        """(R, V) estimated errors of the variants on rungs (V,); NaN where no estimate exists."""
+        return self.by.errors.errors(self.march, rung, self.places, self.neighbours)
+
+    def held(self, rung: Numbers, tighter: Array) -> Array:
+        """(V,) the largest of the errors that are held, less what the study fixes, over their tolerances; tighter (V,):
+        `solver.tolerance` of the variants over the study's."""
+        return self.by.errors.worst(rung, self.places, self.neighbours, tighter)
+
+    def rungs(self, tighter: Array) -> Numbers:
+        """(V,) the cheapest rungs that hold."""
+        return self.by.of(self.places, self.neighbours, tighter)
 
 
 class Cheapest(NamedTuple):

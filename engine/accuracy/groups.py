@@ -192,8 +192,9 @@ class MarchGroup(Group):
             found = self._heard(values, variants, choice, halted, kept)
         else:
             now, rung = self._marched(values, halted, kept), choice.rung[variants]
-            held = choice.held(variants, rung, values.tighter)
-            found = Found(now, used(self.tables, variants.size), choice.errors(variants, rung), held)
+            around = choice.around(variants)
+            held = around.held(rung, values.tighter)
+            found = Found(now, used(self.tables, variants.size), around.errors(rung), held)
         if not np.isfinite(tolerances(self._results)).any():  # what is only told decides, and misses nothing
             return found._replace(held=np.full(variants.size, -np.inf))
         return found
@@ -213,18 +214,19 @@ class MarchGroup(Group):
         now, rung = self._marched(values, halted, "histories"), choice.rung[variants].copy()
         taken = used(self.tables, variants.size)
         heard = vibration(self.tables, values, self.grid.stations(self.model, self.by), now)
-        missed = np.flatnonzero(choice.held(variants, rung, values.tighter, heard) > 1.0)
+        around = choice.around(variants, heard)
+        missed = np.flatnonzero(around.held(rung, values.tighter) > 1.0)
         if missed.size:
-            rung[missed] = choice.again(variants[missed], values.tighter[missed], heard[missed])
+            rung[missed] = choice.around(variants[missed], heard[missed]).rungs(values.tighter[missed])
             for group, lanes in on_rungs(self.grid, rung[missed], variants[missed], values.part(missed)):
                 own = missed[lanes]
                 now = now.replaced(own, group._marched(values.part(own), halted, "histories"))
                 for name, column in used(group.tables, own.size).items():
                     taken[name][own] = column
                 group.forget()
-        held, told = choice.held(variants, rung, values.tighter, heard), choice.errors(variants, rung, heard)
+        held, told = around.held(rung, values.tighter), around.errors(rung)
         if not choice.measured.free:  # what the study fixes, as few modes, need not rise with vibration
-            told = np.maximum(told, choice.errors(variants, rung))
+            told = np.maximum(told, choice.around(variants).errors(rung))
         return Found(now, taken, told, held)
 
     def forget(self) -> None:

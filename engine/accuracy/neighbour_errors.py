@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.accuracy.results import Result, deciding, results_of, tolerances, worst_held
-from engine.kernels.nearest_pilots import held_errors, nearest, told_errors
+from engine.kernels.nearest_pilots import held_errors, nearest, rises, told_errors
 from engine.march.outcome import Asked
 from results_schema.arrays import Array
 
@@ -71,10 +71,9 @@ class NeighbourErrors:
     def errors(self, march: Numbers, rung: Numbers, places: Array, neighbours: Numbers) -> Array:
         """(R, V) estimated errors by the marches (columns x cuts, P) of neighbours (V, k) that tell of the rung of a
         variant at its place (V, D); NaN where no estimate exists."""
-        found, rises = np.empty((self.error.shape[1], rung.size)), np.zeros(neighbours.shape)
-        for slope, place, pilots in zip(self.told_slopes, places.T, self.pilots, strict=True):
-            rises += slope[rung][:, None] * (place[:, None] - pilots[neighbours])
-        told_errors(self.error, march, rung, np.exp(rises), neighbours, found)
+        found, rise = np.empty((self.error.shape[1], rung.size)), np.empty(neighbours.shape)
+        rises(self.told_slopes, rung, places, self.pilots, neighbours, rise)
+        told_errors(self.error, march, rung, np.exp(rise), neighbours, found)
         if self.by_elements.any():
             own, level = np.arange(len(self.by_elements), dtype=np.int32)[None], np.ones(neighbours.shape)
             told_errors(self.by_elements, own, np.zeros_like(rung), level, neighbours, beside := np.empty_like(found))

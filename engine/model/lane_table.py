@@ -91,7 +91,8 @@ class LaneTable:
         omega h from which modes take more mass, their stiffness and damping the same."""
         h = step[:, None, :]
         turned = self.omega[:, None] * h
-        slower = np.minimum(1.0, scaled_from / np.maximum(turned, np.finfo(np.float64).tiny))
+        limited = not math.isinf(scaled_from)
+        slower = np.minimum(1.0, scaled_from / np.maximum(turned, np.finfo(np.float64).tiny)) if limited else 1.0
         own = np.arange(self.mass.shape[1]) if ties is None else ties
         return Lanes(
             stiffness=(turned * slower) ** 2,

@@ -232,8 +232,9 @@ def _check_repeats(study: Study, cases: Cases) -> None:
         if axis.dim != VARIANT:
             check_distinct(study, axis.name, axis.values)
     paired = [axis.values for axis in cases.axes if axis.dim == VARIANT] if study.sweep.zip else []
-    rows = np.array(paired) if paired else np.zeros((1, 0))
-    counts = np.unique(rows, axis=1, return_counts=True)[1]
+    if not paired or any(np.unique(values).size == len(values) for values in paired):  # and with these every row
+        return
+    counts = np.unique(np.array(paired), axis=1, return_counts=True)[1]
     if (counts > 1).any():
         what = "zipped axes repeat a variant"
         raise study.source.fault("sweep", what, received=f"{int((counts > 1).sum())} repeated")

@@ -47,11 +47,9 @@ def chosen(plan: Plan) -> list[Part]:
 def _chosen(plan: Plan, group: MarchGroup) -> Part:
     assert plan.choice is not None
     some = group.variants[spread(group.variants.size, MOST_LOOKED_AT)]
-    rung, tighter = plan.choice.rung[some], plan.cases_tolerance[some]
-    error = plan.choice.errors(some, rung)[_is_held(plan)]
-    return Part(
-        group.variants.size, used(group.tables, 1), error, _asked(plan, tighter), plan.choice.held(some, rung, tighter)
-    )
+    rung, tighter, around = plan.choice.rung[some], plan.cases_tolerance[some], plan.choice.around(some)
+    error, held = around.errors(rung)[_is_held(plan)], around.held(rung, tighter)
+    return Part(group.variants.size, used(group.tables, 1), error, _asked(plan, tighter), held)
 
 
 def converged(plan: Plan, found: Found, tighter: Array) -> Iterator[Part]:

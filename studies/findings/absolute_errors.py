@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial, reduce
 from typing import Any
 
 import numpy as np
@@ -147,7 +148,7 @@ def _is_pushed(results: Results, sensor: str) -> bool:
 
 def _largest(parts: list[xr.DataArray]) -> xr.DataArray:
     """The largest magnitude of some results."""
-    return abs(xr.concat(parts, "part", coords="minimal", compat="override")).max("part")
+    return reduce(partial(xr.apply_ufunc, np.fmax), map(abs, parts))
 
 
 def _cruise(results: Results) -> Any:
