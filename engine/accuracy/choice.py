@@ -26,7 +26,6 @@ from engine.accuracy.neighbour_errors import (
     nearest_others,
     neighbour_errors_of,
 )
-from engine.accuracy.reference import DOUBTED
 from engine.accuracy.results import Result, deciding, results_of, worst_held
 from engine.kernels.nearest_pilots import cheapest, nearest
 from engine.march.outcome import Asked
@@ -45,6 +44,7 @@ SHARE_OF_PILOTS, FEWEST_PILOTS = 12, 128
 NEIGHBOURS = 10
 # What is said of the next three was measured on `asymmetry`, `double-peak` and 10,000 passages, with 128 to 256 pilots,
 # by the largest error of 6 neighbours.
+DOUBTED = 0.4  # of the tolerance by which a reference is off: what such pilots tell is apart
 LEAST_WEIGHT = 0.02  # of the largest weight of an axis: none is left out; 0.005 to 0.1 chose alike
 NEAR_PAIRS = 12  # pairs of near pilots per pilot that tell the weights: 6 to 40 took 0.7 to 1 times the work
 SWEEPS = 50  # over the weights: scipy's to eight digits, but for axes that tell the same twice

@@ -30,12 +30,6 @@ from results_schema.arrays import Array, Counts
 #: Modes x steps over a passage or cycle of one march at most: some ten milliseconds. 24 modes and 4,800 steps hold 1e-3
 #: for the hardest passage of accuracy.md; undamped loads that step on free ends needed a hundred times that at 1e-4.
 MOST_WORK = 3e7
-#: Modes x steps over the whole time of a march that a reference is not worth which is off by less than so much of the
-#: tolerance: in the built-in shuttles such marches were nine tenths of all, and the choice was the same.
-DEAR, DOUBTED = 1e7, 0.4
-#: Times what is dear, from where all that is within the tolerance is close enough: some seconds, which one of the 180
-#: pilots of `double-peak` took of 18 in all; without them none of its 2,160 variants missed, with as many modes.
-FAR_TOO_DEAR = 10.0
 FIRST_PERIODS = 20  # steps per first period of schemes without a limit at level 0: 8e-3 of phase at most
 #: The same up to which no mode takes mass (four of a beam need 50 to 110): where loads step onto a free end, with 20 to
 #: 80 and no such rule, 5 to 8 % of variants that hold 1e-3 were marked.
@@ -72,13 +66,14 @@ class Converged:
 
 
 class Beyond(NamedTuple):
-    """So many levels more than are needed, unless they take more than so many modes x steps."""
+    """So many levels more than are needed, unless the next one takes more than so many modes x steps over the whole
+    time."""
 
     levels: int
     dear: float
 
 
-NO_FURTHER, IN_TURN = Beyond(0, DEAR), InTurn()
+NO_FURTHER, IN_TURN = Beyond(0, np.inf), InTurn()
 
 
 class Levels(NamedTuple):
@@ -179,10 +174,8 @@ def converge(
         found = _updated(found, active, now, spent, remaining)
         change[:, active] = apart
         off = worst_held(remaining, decisive, own.tighter)
-        next_work = _work_in_all(grid, own, levels, level + 1)
-        too_dear = next_work > beyond.dear
-        enough = np.select([next_work > FAR_TOO_DEAR * beyond.dear, too_dear], [1.0, DOUBTED])
-        settled = off <= np.maximum(part, enough)
+        too_dear = _work_in_all(grid, own, levels, level + 1) > beyond.dear
+        settled = off <= part
         found.settled[active] = settled
         found.spent[active] += spent["work"]
         found.level[active] = level

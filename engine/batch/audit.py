@@ -17,7 +17,6 @@ from engine.accuracy.grids import SceneGrid
 from engine.accuracy.groups import PACE
 from engine.accuracy.jobs import Crashed, Halted, Job, Share, over_scenes
 from engine.accuracy.reference import (
-    DEAR,
     IN_TURN,
     Beyond,
     Converged,
@@ -45,8 +44,9 @@ TABLES = 30  # variants at PACE that take as long as the tables of a march: 29 t
 #: Modes x steps at PACE of the tables of all levels, and the work of an audit over that of the references of pilots:
 #: ten audits of 64 took 0.3 to 1.7 times as long as by these two.
 TABLES_OF_AUDITS, FURTHER = 5e8, 5.0
-
-
+#: Modes x steps over the whole time of a variant, some ten milliseconds, from which on it takes no level more than it
+#: needs to be known.
+DEAR = 1e7
 _NONE = np.zeros((0, 0)), np.zeros((0, 0))
 
 

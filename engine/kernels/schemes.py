@@ -54,6 +54,9 @@ class Scheme(Protocol):
         """Velocity, over h^2, with which a mode of omega h = x starts where its load begins to grow at the rate of
         one, as velocities of the scheme may be other than derivatives; mostly none."""
 
+    def velocity_part(self, x: FloatArray) -> FloatArray:
+        """Velocity over that of a mode of omega h = x which swings freely, mostly one."""
+
     def phase(self, x: FloatArray) -> FloatArray:
         """Angle (0 to pi) by which an undamped oscillator of omega h = x turns in one step of the scheme."""
 
@@ -100,6 +103,14 @@ class NewmarkScheme:
         y = np.minimum(x, self.scaled_from)
         slower, root = np.where(x > y, y / np.maximum(x, 1.0), 1.0), np.sqrt(1.0 - y**2 / 6.0)
         return np.asarray(slower**2 * (1.0 / (6.0 * (1.0 + root)) + root * (1.0 - slower) / self.scaled_from**2))
+
+    def velocity_part(self, x: FloatArray) -> FloatArray:
+        """Velocity over that of a mode of omega h = x which swings freely:  s (1 - y^2/6)^1/2  of Fox-Goodwin's, s and
+        y as of `velocity_at_kinks`."""
+        if math.isinf(self.scaled_from):
+            return np.ones_like(x)
+        y = np.minimum(x, self.scaled_from)
+        return np.asarray(np.where(x > y, y / np.maximum(x, 1.0), 1.0) * np.sqrt(1.0 - y**2 / 6.0))
 
     @property
     def stability_limit(self) -> float:
@@ -195,6 +206,10 @@ class AlphaScheme:
     def velocity_at_kinks(self, x: FloatArray) -> FloatArray:
         """None."""
         return np.zeros_like(x)
+
+    def velocity_part(self, x: FloatArray) -> FloatArray:
+        """All of it."""
+        return np.ones_like(x)
 
     def amplification(self, x: float) -> FloatArray:
         """On the predictors u*, v* and the memory e; the true acceleration is -x^2 u*/(1 + beta x^2)."""

@@ -17,7 +17,7 @@ from engine.kernels.stepping.start import solve_initial_acceleration, strike, wa
 from engine.march.initial_state import initial_state
 from engine.march.stepper import go
 from engine.model.lane_table import from_blocks, lane_table
-from engine.model.track import rate_jumps, tabulate_blow, ties_with_inertia
+from engine.model.track import tabulate_blow, ties_with_inertia
 from engine.observation.contact_forces import contacts_that_react
 from engine.observation.histories import rows_sampled
 from results_schema.arrays import Array, Counts
@@ -59,7 +59,8 @@ class Observed(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class March:
-    """The stepper of bodies in modal coordinates: variants of one scene in blocks, and what is kept of them."""
+    """The stepper of bodies in modal coordinates: variants of one scene in blocks, and what is kept of them. ending (C,
+    N): how fast modal forces grew at the end of the segment that was stepped last."""
 
     tables: SceneTables
     lanes: LaneTable
@@ -69,6 +70,7 @@ class March:
     unrecorded: Array
     resting: Array
     history: Array
+    ending: Array
 
     def go(self, halted: Callable[[], bool] = lambda: False) -> Codes:
         """All segments, once. Raises Halted."""
@@ -95,7 +97,9 @@ class March:
     def start(self, segment: Segment, table: SegmentTable, observed: Observed, before: Segment | None) -> None:
         """The impulse and the new accelerations of a segment's event, and its first station, seen with all modes' own
         masses."""
-        model, stepped = self.tables.model, self.stepped(segment, table)
+        model, stepped, rescaled = self.tables.model, self.stepped(segment, table), self.is_rescaled(segment, before)
+        if rescaled:
+            self._change_step(segment, table, before)
         if self.unseen(segment, before):
             whole = self.lanes.steps_of(self.step_size(segment), table.numbers)
             if segment.strikes:
@@ -107,17 +111,26 @@ class March:
             if segment.fresh:
                 solve_initial_acceleration(table.ties, whole, self.state)
             watch_start(table.ties, whole, self.state, *observed, segment.first)
-        if self.is_rescaled(segment, before):
-            if segment.fresh:
-                self._take_rates(segment, before)
+        if rescaled:
             solve_initial_acceleration(table.ties, stepped, self.state)
 
-    def _take_rates(self, segment: Segment, before: Segment | None) -> None:
-        """Velocities jump where modal forces begin to grow faster, as those of Fox-Goodwin are no derivatives."""
+    def _change_step(self, segment: Segment, table: SegmentTable, before: Segment | None) -> None:
+        """Velocities of the scheme, which are no derivatives, become those of a segment's step and loads: what swings
+        freely goes on as far as it did, whatever the steps are, and about what the loads push on."""
+        model, velocity = self.tables.model, self.state.v
+        if before is not None:
+            turned = [model.omega[:, None] * self.step_size(one)[:, None] for one in (before, segment)]
+            was, becomes = (model.scheme.velocity_part(part) for part in turned)
+            kept = becomes / was
+            kept[:, model.residuals] = 1.0
+            velocity[...] = (velocity - self._beyond_derivatives(before, self.ending)) * kept
+        velocity[...] += self._beyond_derivatives(segment, table.rates[0])
+
+    def _beyond_derivatives(self, segment: Segment, rates: Array) -> Array:
+        """(blocks, N, LANES) what velocities of the scheme are beyond derivatives by rates of `force_rates`."""
         model, step = self.tables.model, self.step_size(segment)[:, None]
-        weights = self.lanes.weight[:, : len(model.carriages)] / self.lanes.time_scale[:, None]
-        rates = np.einsum("bcj,ck->bkj", weights, rate_jumps(model, segment, before))
-        self.state.v[...] += rates * step**2 * model.scheme.velocity_at_kinks(model.omega[:, None] * step)
+        loads = np.einsum("bcj,ck->bkj", self.lanes.weight[:, : len(model.carriages)], rates)
+        return np.asarray(loads * step * model.scheme.velocity_at_kinks(model.omega[:, None] * step))
 
     def unseen(self, segment: Segment, before: Segment | None) -> bool:
         """Whether the first station of a segment was not observed as the last one of the segment before."""
@@ -139,6 +152,8 @@ class March:
         """The steps of a segment, from its station 0, which is settled and seen."""
         stepped = self.stepped(segment, table)
         scheme = self.tables.scheme
+        if table.rates.size:
+            self.ending[...] = table.rates[1]
         return step_kernel(table.ties)(table.ties, stepped, self.state, *observed, scheme, segment.first)
 
     def step_size(self, segment: Segment) -> Array:
@@ -199,7 +214,8 @@ def prepare(tables: SceneTables, values: VariantValues, counts: Counts, sampled:
     statistics[:, :, layout.BOUND], unrecorded[:, :, layout.BOUND] = bounds, bounds[:, guarded:]
     resting = statistics.copy() if tables.watches_rest else statistics[:, :0]
     history = np.full((blocks, counts.size, sensors if sampled is None else sampled, layout.LANES), np.nan)
-    return March(tables, lanes, counts, initial_state(tables.model, lanes), statistics, unrecorded, resting, history)
+    state, ending = initial_state(tables.model, lanes), np.zeros((len(tables.model.carriages), tables.model.omega.size))
+    return March(tables, lanes, counts, state, statistics, unrecorded, resting, history, ending)
 
 
 def march(

@@ -15,9 +15,9 @@ from engine.kernels.layout import Alpha, Newmark, Observation, Ties
 from engine.march.step_rules import free_steps
 from engine.model.attachment import residual
 from engine.model.scene_model import SceneModel
-from engine.model.station_path import ways
+from engine.model.station_path import Along, ways
 from engine.model.timeline import MOST_STATIONS, Segment, Timeline, Window, build_timeline, coarsened, refined
-from engine.model.track import closed, tie_rows, ties_of
+from engine.model.track import closed, force_rates, tie_rows, ties_of
 from engine.observation import kinks, signals
 from engine.observation.contact_forces import contacts_that_react
 from engine.observation.readings import Sensor
@@ -32,12 +32,14 @@ KEPT_BYTES = 96 * 2**20  # tables kept per scene; those beyond are built again
 
 
 class SegmentTable(NamedTuple):
-    """What the march needs of one segment besides its lanes. numbers: of the scene's ties that count in it."""
+    """What the march needs of one segment besides its lanes. numbers: of the scene's ties that count in it. rates (2, C,
+    N): of `force_rates`, at its beginning and end."""
 
     numbers: Counts
     ties: Ties
     watch: Observation
     unrecorded: Observation
+    rates: Array
 
     @property
     def bytes(self) -> int:
@@ -164,9 +166,11 @@ class SceneTables:
             rows = rows.held(stations)
             watch, unrecorded = (signals.held(one, stations) for one in (watch, unrecorded))
         if len(segments) == 1:
-            return [SegmentTable(numbers, closed(self.model, rows, self.scheme), watch, unrecorded)]
+            rates = self._rates(along, (0, -1))
+            return [SegmentTable(numbers, closed(self.model, rows, self.scheme), watch, unrecorded, rates)]
         tables, ends = list[SegmentTable](), np.cumsum([segment.steps + 1 for segment in segments])
-        for segment, part in zip(segments, map(slice, [0, *ends[:-1]], ends), strict=True):
+        rates = self._rates(along, np.stack([[0, *ends[:-1]], ends - 1], axis=1).reshape(-1).tolist())
+        for number, (segment, part) in enumerate(zip(segments, map(slice, [0, *ends[:-1]], ends), strict=True)):
             own = ties_of(self.model, segment.active)
             places = np.searchsorted(numbers, own)
             ties = closed(self.model, rows.part(part, own), self.scheme)
@@ -174,8 +178,14 @@ class SceneTables:
                 signals.along_part(whole, of, part, places, numbers.size)
                 for whole, of in ((watch, self.signals), (unrecorded, others))
             )
-            tables.append(SegmentTable(own, ties, watched, unseen))
+            tables.append(SegmentTable(own, ties, watched, unseen, rates[2 * number : 2 * number + 2]))
         return tables
+
+    def _rates(self, along: Along, stations: Sequence[int]) -> Array:
+        """(stations, C, N) of `force_rates`, where the scheme asks for them; else (stations, 0, 0)."""
+        if math.isinf(self.model.scheme.scaled_from):
+            return np.zeros((len(stations), 0, 0))
+        return force_rates(self.model, along, stations)
 
     def _missed_of(self, key: SegmentKey) -> Missed:
         """Where the responses that the kept modes miss are kept from cycle to cycle: they take much longer to tabulate

@@ -44,9 +44,9 @@ class StationPath:
         """(S,) at which stations it touches."""
         return np.full(self.s.size, self.active) if self.here is None else self.here
 
-    def at(self, station: int) -> StationPath:
-        """It at one station alone."""
-        own = slice(station, station + 1)
+    def at(self, *stations: int) -> StationPath:
+        """It at some stations alone."""
+        own = list(stations)
         here = None if self.here is None else self.here[own]
         return replace(self, s=self.s[own], ds=self.ds[own], dds=self.dds[own], here=here, _shapes={})
 

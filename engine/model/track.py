@@ -245,20 +245,15 @@ def tabulate_blow(model: SceneModel, segment: Segment, ties: Counts, mass: Array
     return Impulse(shape, slope, sag_slope, arrives, mass, speed)
 
 
-def rate_jumps(model: SceneModel, segment: Segment, before: Segment | None) -> Array:
-    """(C, N) by how much faster modal forces of unit weights of the carriages grow after a segment's beginning than
-    before, per unit of scene time: where one comes on, leaves or turns."""
-    found = np.zeros((len(model.carriages), model.omega.size))
-    for sign, side in ((1.0, segment), (-1.0, before)):
-        if side is None:
-            continue
-        along = _here(model, side, segment.start)
-        for number, carriage in enumerate(model.carriages):
-            for load in carriage.attachments:
-                if load.rider is not None and along[load.rider].active:
-                    path = model.riders[load.rider].path_on_body(np.array([segment.start]), side.start, side.end)
-                    slope = shape_rows(model, load, along, 1)[0]
-                    found[number, model.bodies[load.body].modes] += sign * load.factor * float(path.dS[0]) * slope
+def force_rates(model: SceneModel, along: Along, stations: Sequence[int]) -> Array:
+    """(stations, C, N) how fast modal forces of unit weights of the carriages grow at some stations, per step."""
+    there = tuple(way.at(*stations) for way in along)
+    found = np.zeros((len(stations), len(model.carriages), model.omega.size))
+    for number, carriage in enumerate(model.carriages):
+        for load in carriage.attachments:
+            if load.rider is not None and there[load.rider].active:
+                slope = load.factor * there[load.rider].ds[:, None] * shape_rows(model, load, there, 1)
+                found[:, number, model.bodies[load.body].modes] += slope
     return found
 
 

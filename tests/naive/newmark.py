@@ -128,21 +128,33 @@ def slowed(scene: Scene, scheme: Newmark | GeneralizedAlpha, h: float) -> Scene:
     return replace(scene, modal_mass=times**2)
 
 
-def velocity_at_kink(scene: Scene, scheme: Newmark | GeneralizedAlpha, t: float, h: float, first: bool) -> Array:
-    """Jump dq' where the forces of loads begin to grow faster, of a scheme with masses of `slowed`: so that modes swing
-    about r t/omega^2 by r/omega^3."""
+def velocity_after(
+    scene: Scene, scheme: Newmark | GeneralizedAlpha, t: float, v: Array, h: tuple[float | None, float]
+) -> Array:
+    """q' just after t of a scheme with masses of `slowed`, whose step before and after is h: modes swing on as far as
+    they did, and by r/omega^3 about what grows at the rate r."""
     if not isinstance(scheme, Newmark) or math.isinf(scheme.scaled_from):
-        return np.zeros_like(scene.omega)
-    rate = np.zeros_like(scene.omega)
-    for load in scene.loads:
-        for sign, phase in ((1.0, load.phase(t, "right")), (-1.0, None if first else load.phase(t, "left"))):
+        return v
+    found = v.copy()
+    for step, side, sign in ((h[0], "left", -1), (h[1], "right", 1)):
+        if step is None:
+            continue
+        rate = np.zeros_like(scene.omega)
+        for phase, load in ((load.phase(t, side), load) for load in scene.loads):
             if phase is not None:
                 weight = load.weight + (0.0 if load.sprung is None else load.sprung.weight)
-                rate += sign * weight * phase.ds(t) * scene.phi(phase.s(t), 1)
-    omega = np.where(scene.omega > 0.0, scene.omega, 1.0)  # sprung masses feel no rate
-    seen = np.minimum(omega * h, scheme.scaled_from)
-    slower = seen / (omega * h)
-    return np.asarray(rate / omega**2 * (1.0 - slower * np.sqrt(1.0 - seen**2 / 6.0)))
+                rate += weight * phase.ds(t) * scene.phi(phase.s(t), 1)
+        omega = np.where(scene.omega > 0.0, scene.omega, 1e-9)  # sprung masses feel no rate
+        seen = np.minimum(omega * step, scheme.scaled_from)
+        part = seen / (omega * step) * np.sqrt(1.0 - seen**2 / 6.0)
+        beyond = rate / omega**2 * (1.0 - part)
+        if sign < 0:
+            found, before = found - beyond, part
+        else:
+            kept = np.ones_like(part) if h[0] is None else part / before
+            kept[[load.residual for load in scene.loads if load.residual is not None]] = 1.0
+            found = found * kept + beyond
+    return found
 
 
 def _weights(scheme: Newmark | GeneralizedAlpha) -> tuple[float, float, float, float]:
@@ -174,9 +186,10 @@ def march(
     t, inner = snapped(scene, times)
     steps = np.append(np.diff(t), t[-1] - t[-2])
     n_modes, one = len(scene.omega), np.eye(len(scene.omega))
-    v = start.v + velocity_at_kink(scene, scheme, t[0], steps[0], first=True)
-    states, true, before = [start], [acceleration(at(t[0], "right"), t[0], start, "right")], []
-    a = acceleration(slowed(at(t[0], "right"), scheme, steps[0]), t[0], State(start.q, v), "right")
+    v = velocity_after(scene, scheme, t[0], start.v, (None, steps[0]))
+    states, before = [State(start.q, v)], []
+    true = [acceleration(at(t[0], "right"), t[0], states[0], "right")]
+    a = acceleration(slowed(at(t[0], "right"), scheme, steps[0]), t[0], states[0], "right")
     for n in range(1, len(t)):
         h, q = steps[n - 1], states[-1].q
         here, there = slowed(at(t[n], "left"), scheme, h), slowed(at(t[n], "right"), scheme, steps[n])
@@ -190,10 +203,14 @@ def march(
         state = State(u_star + beta * h**2 * a, v)
         if n in inner:
             before.append(Event(n, t[n], state.v, now, contact_forces(here, t[n], state, now, "left")))
+            v = velocity_after(scene, scheme, t[n], v, (h, steps[n]))
+            state = State(state.q, v)
             blow = impulse(slowed(scene, scheme, steps[n]), t[n], state) if strike is None else strike(t[n], state)
             state = State(state.q, state.v + blow)
             now = a = acceleration(at(t[n], "right"), t[n], state, "right")
-            v = state.v + velocity_at_kink(scene, scheme, t[n], steps[n], first=False)
+            v = state.v
+        elif not math.isclose(h, steps[n]):
+            v = velocity_after(scene, scheme, t[n], v, (h, steps[n]))
         if there.modal_mass is not None and (n in inner or not math.isclose(h, steps[n])):
             a = acceleration(there, t[n], State(state.q, v), "right")
         states.append(state)
