@@ -32,8 +32,8 @@ KEPT_BYTES = 96 * 2**20  # tables kept per scene; those beyond are built again
 
 
 class SegmentTable(NamedTuple):
-    """What the march needs of one segment besides its lanes. numbers: of the scene's ties that count in it. rates (2, C,
-    N): of `force_rates`, at its beginning and end."""
+    """What the march needs of one segment besides its lanes. numbers: of the scene's ties that count in it. rates: of
+    `force_rates`, (2, C, N) at its beginning and end."""
 
     numbers: Counts
     ties: Ties
@@ -68,6 +68,7 @@ class SceneTables:
     _kept: dict[SegmentKey, SegmentTable] = field(default_factory=dict, init=False)
     _next: dict[SegmentKey, SegmentTable] = field(default_factory=dict, init=False)
     _missed: dict[SegmentKey, Missed] = field(default_factory=dict, init=False)
+    _held: int = field(default=0, init=False)  # bytes of those that are kept
     _lock: threading.Lock = field(default_factory=threading.Lock, init=False)
 
     @cached_property
@@ -131,8 +132,9 @@ class SceneTables:
                     built = self._build(several, self._missed_of(key))
                     self._next = dict(zip(map(_key, several), built, strict=True))
                 found = self._next.pop(key)
-                if sum(table.bytes for table in self._kept.values()) + found.bytes <= self.kept_bytes:
+                if self._held + found.bytes <= self.kept_bytes:
                     self._kept[key] = found  # and no other goes: marches ask for all in turn, the oldest first
+                    self._held += found.bytes
         return found
 
     def _from(self, segment: Segment) -> tuple[Segment, ...]:
@@ -199,6 +201,7 @@ class SceneTables:
         """Drop the tables, when no chunk needs them any more."""
         with self._lock:
             self._kept.clear()
+            self._held = 0
             self._next.clear()
             self._missed.clear()
         for companion in self.companions:

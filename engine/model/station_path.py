@@ -5,9 +5,10 @@ Derivatives by time are counted per step: ds = S' h and dds = S'' h^2 in scene t
 
 from __future__ import annotations
 
+import bisect
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,11 +69,37 @@ Along = tuple[StationPath, ...]  # all riders along some stations
 
 def ways(model: SceneModel, *segments: Segment) -> Along:
     """The ways of all riders at the stations 0..steps of segments, one after the other."""
-    times, highest = [station_times(segment) for segment in segments], _highest(model)
-    return tuple(
-        _joined([_way(rider, s, tau, s.active[r], highest[r]) for s, tau in zip(segments, times, strict=True)])
-        for r, rider in enumerate(model.riders)
-    )
+    times, found = [station_times(segment) for segment in segments], list[StationPath]()
+    for number, (rider, highest) in enumerate(zip(model.riders, _highest(model), strict=True)):
+        parts = [
+            _way(rider, span, segments[own], np.concatenate(times[own]), highest)
+            for span, own in _spans(rider, number, segments)
+        ]
+        found.append(_joined(parts))
+    return tuple(found)
+
+
+class Span(NamedTuple):
+    """Scene time between two events of a rider, and whether it is on its body; nothing matters where it is not."""
+
+    start: float
+    end: float
+    active: bool
+
+
+NOWHERE = Span(0.0, 0.0, active=False)
+
+
+def _spans(rider: Rider, number: int, segments: Sequence[Segment]) -> list[tuple[Span, slice]]:
+    """Neighbouring segments, by their places, between the same events of a rider: the path along them is one."""
+    events, found = sorted(rider.events()), list[Span]()
+    for segment in segments:
+        place = bisect.bisect(events, 0.5 * (segment.start + segment.end))
+        inside = 0 < place < len(events) and not segment.free
+        ends = (events[place - 1], events[place]) if inside else (segment.start, segment.end)
+        found.append(Span(*ends, active=True) if segment.active[number] else NOWHERE)
+    firsts = [n for n, span in enumerate(found) if n == 0 or span != found[n - 1]]
+    return [(found[n], slice(n, end)) for n, end in zip(firsts, [*firsts[1:], len(found)], strict=True)]
 
 
 def station_times(segment: Segment) -> Array:
@@ -135,13 +162,16 @@ def in_row(model: SceneModel, name: str, places: Array) -> Array:
     return np.full_like(places, start - behind)
 
 
-def _way(rider: Rider, segment: Segment, tau: Array, active: bool, highest: int) -> StationPath:
-    if not active:
+def _way(rider: Rider, span: Span, segments: Sequence[Segment], tau: Array, highest: int) -> StationPath:
+    """A rider at the stations of segments within a span, whose scene times are tau."""
+    if not span.active:
         nowhere = np.zeros_like(tau)
-        return StationPath(nowhere, nowhere, nowhere, active, highest=highest)
-    path = rider.path_on_body(tau, segment.start, segment.end)
-    place = path.S
-    for end, inward, jumps in ((0, 1.0, segment.jumps[0]), (-1, -1.0, segment.jumps[1])):
-        if jumps:
-            place[end] += inward * BESIDE * rider.length * np.sign(path.dS[end])
-    return StationPath(place, path.dS * segment.step, path.ddS * segment.step**2, active, highest=highest)
+        return StationPath(nowhere, nowhere, nowhere, span.active, highest=highest)
+    path, stations = rider.path_on_body(tau, span.start, span.end), [segment.steps + 1 for segment in segments]
+    place, step = path.S, np.repeat([segment.step for segment in segments], stations)
+    for segment, after in zip(segments, np.cumsum(stations), strict=True):
+        ends = (after - segment.steps - 1, 1.0, segment.jumps[0]), (after - 1, -1.0, segment.jumps[1])
+        for end, inward, jumps in ends:
+            if jumps:
+                place[end] += inward * BESIDE * rider.length * np.sign(path.dS[end])
+    return StationPath(place, path.dS * step, path.ddS * step**2, span.active, highest=highest)
