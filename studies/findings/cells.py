@@ -4,11 +4,12 @@ import numpy as np
 
 from results_schema.arrays import Array
 from results_schema.status import Status
+from studies.findings.absolute_errors import LEAST_PART
 from studies.findings.beyond import LIMIT, limits_of
 from studies.results.axes import Axis
 from studies.results.cells import CellRange, End, cell_ranges, words_of
-from studies.results.findings_common import told_statuses
-from studies.results.formatting import counted, listed, quantity, spanned
+from studies.results.findings_common import LOOSE, told_statuses
+from studies.results.formatting import counted, listed, percent, quantity, spanned
 from studies.results.results import Results
 
 MOST_TOLD = 3
@@ -45,15 +46,32 @@ def _judged(results: Results, sensor: str, limit: float) -> str:
     """In which cells some variant of a sensor is beyond its limit, from the extremes of the cells: a sentence."""
     ends = (("largest", f"{sensor}_max"), ("smallest", f"{sensor}_min"))
     sizes = [np.abs(results.dataset[side].sel(result=name).transpose(*results.dims).values) for side, name in ends]
+    errors = [results.dataset[f"{side}_error"].sel(result=name).transpose(*results.dims).values for side, name in ends]
     beyond = np.nan_to_num(np.maximum(*sizes)) > limit
     said = f"{LIMIT}{quantity(limit, results.sensors[sensor])}"
+    # As parts of the true value, which may be larger by as much; an error that nobody knows counts as none.
+    most = [
+        size / np.maximum(1.0 - np.nan_to_num(error), LEAST_PART) for size, error in zip(sizes, errors, strict=True)
+    ]
+    perhaps = ~beyond & (np.nan_to_num(np.maximum(*most)) > limit)
+    if perhaps.any():
+        within = percent(float(np.nanmax(np.where(perhaps, np.fmax(*errors), np.nan))))
+        where = f" in {int(perhaps.sum()):,} more of them" if beyond.any() else ""
+        doubt = (
+            f"; by estimated errors of up to {within} perhaps{where or ' somewhere'}, which a tolerance of its own on "
+        )
+        doubt += f"sensor {sensor} tells"
+    else:
+        doubt = ""
     opened = "; those whose contact opens count too" if Status.SEPARATED in results.status_counts else ""
     if not beyond.any():
-        return f"{said} nowhere."
+        return f"{said} nowhere{doubt}."
     if not results.dims:
         return f"{said} in some of the variants{opened}."
     many = f"{int(beyond.sum()):,}" if not beyond.all() else "all"
-    return f"{said} in some variants of {many} of {counted(results.size, 'cell')}{_along(results, beyond)}{opened}."
+    return (
+        f"{said} in some variants of {many} of {counted(results.size, 'cell')}{_along(results, beyond)}{opened}{doubt}."
+    )
 
 
 def _along(results: Results, beyond: Array) -> str:
@@ -74,7 +92,8 @@ def _told(results: Results, found: CellRange) -> str:
 
 def _value(found: CellRange, end: End) -> str:
     size = max(abs(found.smallest.value), abs(found.largest.value))
-    return quantity(end.value, found.units, beside=size)
+    loose = f" (estimated to within {percent(end.error)})" if end.error > LOOSE else ""
+    return f"{quantity(end.value, found.units, beside=size)}{loose}"
 
 
 def _where(results: Results, end: End) -> str:

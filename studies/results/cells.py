@@ -20,11 +20,13 @@ _BESIDE = ("_position",)  # where something was, shown by nothing but itself
 
 
 class End(NamedTuple):
-    """An extreme of a result: its value, the variant's number, and its swept numbers by the names of their axes."""
+    """An extreme of a result: its value, the variant's number, its swept numbers by the names of their axes, and the
+    estimated error as archives have it."""
 
     value: float
     variant: int
     at: Mapping[str, float]
+    error: float
 
 
 class CellRange(NamedTuple):
@@ -104,7 +106,8 @@ def _end(dataset: xr.Dataset, side: str, place: int, pick: object) -> End | None
     names: Sequence[str] = dataset["swept"].values.tolist()
     at = dataset[f"{side}_at"].isel(result=place).values.reshape(-1, len(names))[cell]
     variant = int(dataset[f"{side}_variant"].isel(result=place).values.ravel()[cell])
-    return End(float(values[cell]), variant, dict(zip(names, at.tolist(), strict=True)))
+    error = float(dataset[f"{side}_error"].isel(result=place).values.ravel()[cell])
+    return End(float(values[cell]), variant, dict(zip(names, at.tolist(), strict=True)), error)
 
 
 def words_of(results: Results, values: Mapping[str, float]) -> dict[str, str]:

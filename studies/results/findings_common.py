@@ -17,6 +17,8 @@ from studies.results.results import Results, statuses
 
 MOST_MISSED = 3  # sensors that are named where tolerances are missed
 LOOSE = 0.05  # estimated errors above this stand beside the values that they belong to
+REACHED = 0.1  # an estimated error: smaller ones are a tolerance that is worth asking for, with so much room
+ROOM = 1.25
 
 
 def first_carriage(study: Study) -> tuple[str, Carriage]:
@@ -104,7 +106,7 @@ def uncertainty(results: Results, result: str, place: Index) -> str:
     sensor = next((name for name in results.sensors if result in [f"{name}_{end}" for end in ends]), "")
     free = sensor and np.isnan(float(results.dataset["tolerance"].sel(result=result)))
     asks = "a tolerance of its own"
-    if free and results.study.sensor[sensor].takes_limit:
+    if free and results.study.sensor[sensor].takes_limit and not results.study.sensor[sensor].frequency_limit:
         asks = f"a frequency_limit or {asks}"
     remedy = f"; {asks} on sensor {sensor} asks for more" if free else ""
     return f" (estimated to within {percent(error)}{remedy})"
@@ -160,12 +162,20 @@ def remedy(results: Results) -> str:
     more = [f"{len(sensors) - MOST_MISSED} more"] if len(sensors) > MOST_MISSED else []
     names = listed([*sensors[:MOST_MISSED], *more])
     where = f"the sensor{'s' if len(sensors) > 1 else ''} {names}" if sensors else "sensors"
-    without = f'`tolerance = "told"` on {where}'
-    helps = f" What helps: {without}, so that errors are estimated and not held, or a larger tolerance"
+    largest = max((error for error, _ in _missed(results).values()), default=np.inf)
+    own = f"`tolerance = {_reached(largest)}` on {where}, which holds,"
+    without = f'`tolerance = "told"` on {where}, so that errors are estimated and not held,'
+    helps = f" What helps: {own if largest < REACHED else without} or a larger tolerance"
     moving = results.study.carriage.items()
     jumps = [(name, one.motion.smoothed_by) for name, one in moving if "along" in one.pushes and one.motion.smoothed_by]
     smooth = listed([f"carriage.{name}.motion.{key}" for name, key in jumps])
     return f"{helps}; or {smooth}, as forces of inertia that jump strike every mode." if jumps else f"{helps}."
+
+
+def _reached(error: float) -> str:
+    """The next larger tolerance of 1, 2 or 5 times a power of ten that leaves room."""
+    decade = 10.0 ** np.floor(np.log10(error))
+    return f"{next(part * decade for part in (1.0, 2.0, 5.0, 10.0, 20.0) if part * decade >= ROOM * error):g}"
 
 
 def told_statuses(results: Results) -> list[str]:

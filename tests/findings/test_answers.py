@@ -169,10 +169,12 @@ def test_a_missed_tolerance_names_its_result() -> None:
     assert missed_most(Results.of(dataset)) == " (most of all for midspan_max: 3e-2 where 1e-3 was asked)"
     error[:, results.index("midspan")] = [np.nan, 0.05, 0.0, 0.5]
     assert missed_most(Results.of(dataset)) == " (most of all for the history of midspan: 5e-2 where 1e-3 was asked)"
-    helps = "on the sensors midspan and moment, so that errors are estimated and not held, or a larger tolerance."
-    assert answers.answer(dataset)[-3].endswith(
-        f'2 tolerance-missed (values kept). What helps: `tolerance = "told"` {helps}'
-    )
+    said = "2 tolerance-missed (values kept). What helps: `tolerance ="
+    helps = "on the sensors midspan and moment, which holds, or a larger tolerance."
+    assert answers.answer(dataset)[-3].endswith(f"{said} 0.1` {helps}")
+    error[:, results.index("moment_min")] = 0.3
+    helps = "on the sensors moment and midspan, so that errors are estimated and not held, or a larger tolerance."
+    assert answers.answer(dataset)[-3].endswith(f'{said} "told"` {helps}')
 
 
 def test_what_helps_where_a_tolerance_is_missed_names_what_misses_it() -> None:

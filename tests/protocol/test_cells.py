@@ -273,3 +273,17 @@ def test_answers_of_cells_begin_with_the_limit_and_judge_it(
     assert ("Percentiles of 3 cells" in shown) == (dims == 1) and "50 %" in shown
     values = open_archive("a.nc").root["percentile"].sel(result="midspan_max", percent=50.0).values.ravel()
     assert quantity(values.min(), "m") in shown and quantity(values.max(), "m") in shown
+
+
+def test_limits_that_cells_keep_but_for_estimated_errors_are_no_verdict(whole: xr.Dataset, here: Path) -> None:
+    """ "Nowhere" of values that are off by a sixth is told as what it is."""
+    ends = [whole[f"quarter_{end}"].transpose("speed", "variant").values for end in ("max", "min")]
+    limit = 1.1 * float(np.nanmax(np.abs(ends)))
+    text = TEXT.replace("[sweep]", f"[question]\nbending_moment = {limit!r}\n\n[sweep]") + KEPT["percentiles"]
+    dataset = studies.run(engine.load(text))
+    assert "nowhere." in studies.answer(dataset)[0] and "estimated" not in studies.answer(dataset)[0]
+    for side in ("largest", "smallest"):
+        dataset[f"{side}_error"].loc[{"result": ["quarter_max", "quarter_min"]}] = 0.16
+    first = studies.answer(dataset)[0]
+    assert first.count("(estimated to within 16 %)") == 2
+    assert "nowhere; by estimated errors of up to 16 % perhaps somewhere, which a tolerance of its own on" in first
