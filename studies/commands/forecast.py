@@ -12,7 +12,7 @@ import numpy as np
 from engine.accuracy.choice import PILOTS, pilots_of, scenes_of_pilots, usual_pilots
 from engine.accuracy.groups import ConvergingGroup, Group
 from engine.accuracy.jobs import NOBODY, Job
-from engine.batch.audit import audit_seconds, audited
+from engine.batch.audit import TABLES, audit_seconds, audited
 from engine.batch.execution import warm_up
 from engine.batch.executors import Place, Shared, in_processes, place
 from engine.batch.plan import Plan
@@ -149,7 +149,7 @@ def _of_convergence(plan: Plan, looked: Looked, threads: int) -> Forecast:
     seconds = looked.start + at_once * in_turns + more * plan.seconds / min(threads, chunks)
     if not looked.parts:
         less = f"{PATIENCE:.0f} seconds were not enough for a variant to converge: this may take longer"
-        return Forecast(plan, "", (), seconds, less)
+        return Forecast(plan, "", (), max(seconds, _at_least(plan, threads)), less)
     seconds += AUDIT * at_once * -(-min(len(plan.grids), audited(plan)) // threads)
     title = f"What {counted(len(looked.parts), 'variant')} converged with; in a run every variant does by itself"
     return _told(plan, title, looked.parts, seconds)
@@ -159,7 +159,13 @@ def _told(plan: Plan, title: str, parts: Sequence[chosen.Part], seconds: float) 
     return Forecast(plan, title, chosen.rows(plan, parts), seconds, chosen.told_missed(plan, parts))
 
 
-def _without_pilots(plan: Plan, tried: float) -> Forecast:
+def _at_least(plan: Plan, threads: int) -> float:
+    """Seconds that the marches of a plan are expected to take, with tables of the largest, where none was measured."""
+    each = [group.seconds_per_variant for group in plan.groups]
+    return (plan.seconds + TABLES * max(each, default=0.0)) / threads
+
+
+def _without_pilots(plan: Plan, tried: float, threads: int) -> Forecast:
     """A study whose pilots take longer than there is time; tried: seconds after which the first of them, of one scene
     or of a few, were broken off, 0 where there was no time to begin."""
     pilots = pilots_of(plan.cases, plan.members).size
@@ -167,7 +173,8 @@ def _without_pilots(plan: Plan, tried: float) -> Forecast:
     few = scenes_of_pilots(len(plan.grids), plan.size, FIRST)
     more = "there was no time for pilots, variants that are measured first"
     remark = f"{more}: a run has {pilots} of them, and takes what they show to be enough; this may take longer"
-    return Forecast(plan, "", (), BROKEN_OFF * tried * scenes / few, remark)
+    seconds = max(BROKEN_OFF * tried * scenes / few, _at_least(plan, threads))
+    return Forecast(plan, "", (), seconds, remark)
 
 
 def _choose(plan: Plan, here: Place, until: Time, rounds: Sequence[int]) -> Forecast:
@@ -189,7 +196,7 @@ def _choose(plan: Plan, here: Place, until: Time, rounds: Sequence[int]) -> Fore
             break
         found = _Round(trial, pilots, until.clock() - started)
     if found is None:
-        return _without_pilots(plan, tried)
+        return _without_pilots(plan, tried, here.slots)
     return _of_pilots(found, here.slots, start, until.clock)
 
 

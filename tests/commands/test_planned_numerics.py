@@ -188,8 +188,16 @@ def test_pilots_that_are_broken_off_tell_of_those_of_all(lengths: int, more: int
     """Of 40 scenes 128 pilots are of 16, the first four of one."""
     axis = {"of": "body.bed.length", "from": 1.0, "to": 2.0, "count": 40}
     sweep = {"length": axis, "speed": SPEEDS | {"count": 30}} if lengths > 1 else {"speed": SPEEDS, "mass": MASSES}
-    seen = forecasting._without_pilots(planned(beam(modes="auto"), sweep), 2.0)
+    seen = forecasting._without_pilots(planned(beam(modes="auto"), sweep), 2.0, 1)
     assert seen.seconds == forecasting.BROKEN_OFF * 2.0 * more
+
+
+def test_so_many_steps_that_nothing_ends_in_time_are_told_by_what_they_are() -> None:
+    """Not by the time after which the first of them were broken off: 28 s of a thousand times 1e8 steps."""
+    sweep = {"speed": SPEEDS, "mass": MASSES}
+    few, many = (planned(beam(modes=8), sweep, steps=steps) for steps in (4000, 10_000_000))
+    seen = [forecasting._without_pilots(one, 0.01, 2).seconds for one in (few, many)]
+    assert seen[1] >= many.seconds / 2.0 > 10.0 > 100.0 * seen[0]
 
 
 def test_the_audit_of_what_pilots_tell_is_forecast(plan: Plan) -> None:
