@@ -97,9 +97,7 @@ class March:
     def start(self, segment: Segment, table: SegmentTable, observed: Observed, before: Segment | None) -> None:
         """The impulse and the new accelerations of a segment's event, and its first station, seen with all modes' own
         masses."""
-        model, stepped, rescaled = self.tables.model, self.stepped(segment, table), self.is_rescaled(segment, before)
-        if rescaled:
-            self._change_step(segment, table, before)
+        model, stepped, swinging = self.tables.model, self.stepped(segment, table), self.state.v.copy()
         if self.unseen(segment, before):
             whole = self.lanes.steps_of(self.step_size(segment), table.numbers)
             if segment.strikes:
@@ -111,20 +109,22 @@ class March:
             if segment.fresh:
                 solve_initial_acceleration(table.ties, whole, self.state)
             watch_start(table.ties, whole, self.state, *observed, segment.first)
-        if rescaled:
+        if self.is_rescaled(segment, before):
+            self._change_step(segment, table, before, swinging)
             solve_initial_acceleration(table.ties, stepped, self.state)
 
-    def _change_step(self, segment: Segment, table: SegmentTable, before: Segment | None) -> None:
-        """Velocities of the scheme, which are no derivatives, become those of a segment's step and loads: what swings
-        freely goes on as far as it did, whatever the steps are, and about what the loads push on."""
-        model, velocity = self.tables.model, self.state.v
+    def _change_step(self, segment: Segment, table: SegmentTable, before: Segment | None, swinging: Array) -> None:
+        """Velocities of the scheme, which are no derivatives, become those of a segment's step and loads: what was
+        ``swinging`` freely (blocks, N, LANES), before anything struck, goes on as far as it did, whatever the steps
+        are, and about what the loads push on."""
+        model, struck = self.tables.model, self.state.v - swinging
         if before is not None:
             turned = [model.omega[:, None] * self.step_size(one)[:, None] for one in (before, segment)]
             was, becomes = (model.scheme.velocity_part(part) for part in turned)
             kept = becomes / was
             kept[:, model.residuals] = 1.0
-            velocity[...] = (velocity - self._beyond_derivatives(before, self.ending)) * kept
-        velocity[...] += self._beyond_derivatives(segment, table.rates[0])
+            swinging = (swinging - self._beyond_derivatives(before, self.ending)) * kept
+        self.state.v[...] = swinging + struck + self._beyond_derivatives(segment, table.rates[0])
 
     def _beyond_derivatives(self, segment: Segment, rates: Array) -> Array:
         """(blocks, N, LANES) what velocities of the scheme are beyond derivatives by rates of `force_rates`."""

@@ -187,9 +187,8 @@ def march(
     steps = np.append(np.diff(t), t[-1] - t[-2])
     n_modes, one = len(scene.omega), np.eye(len(scene.omega))
     v = velocity_after(scene, scheme, t[0], start.v, (None, steps[0]))
-    states, before = [State(start.q, v)], []
-    true = [acceleration(at(t[0], "right"), t[0], states[0], "right")]
-    a = acceleration(slowed(at(t[0], "right"), scheme, steps[0]), t[0], states[0], "right")
+    states, true, before = [start], [acceleration(at(t[0], "right"), t[0], start, "right")], []
+    a = acceleration(slowed(at(t[0], "right"), scheme, steps[0]), t[0], State(start.q, v), "right")
     for n in range(1, len(t)):
         h, q = steps[n - 1], states[-1].q
         here, there = slowed(at(t[n], "left"), scheme, h), slowed(at(t[n], "right"), scheme, steps[n])
@@ -203,12 +202,10 @@ def march(
         state = State(u_star + beta * h**2 * a, v)
         if n in inner:
             before.append(Event(n, t[n], state.v, now, contact_forces(here, t[n], state, now, "left")))
-            v = velocity_after(scene, scheme, t[n], v, (h, steps[n]))
-            state = State(state.q, v)
             blow = impulse(slowed(scene, scheme, steps[n]), t[n], state) if strike is None else strike(t[n], state)
             state = State(state.q, state.v + blow)
             now = a = acceleration(at(t[n], "right"), t[n], state, "right")
-            v = state.v
+            v = velocity_after(scene, scheme, t[n], v, (h, steps[n])) + blow
         elif not math.isclose(h, steps[n]):
             v = velocity_after(scene, scheme, t[n], v, (h, steps[n]))
         if there.modal_mass is not None and (n in inner or not math.isclose(h, steps[n])):
