@@ -42,9 +42,9 @@ SHARE_OF_PILOTS, FEWEST_PILOTS = 12, 128
 #: displacements missed by 8, 10 and 12, at 5.0, 5.1 and 5.3 times the least work on average; 0.94 % by 8 of which the
 #: worst is believed, at 6.6 times.
 NEIGHBOURS = 10
+DOUBTED = 0.4  # of the tolerance by which a reference is off: what such pilots tell is apart (see `_sorts`)
 # What is said of the next three was measured on `asymmetry`, `double-peak` and 10,000 passages, with 128 to 256 pilots,
 # by the largest error of 6 neighbours.
-DOUBTED = 0.4  # of the tolerance by which a reference is off: what such pilots tell is apart
 LEAST_WEIGHT = 0.02  # of the largest weight of an axis: none is left out; 0.005 to 0.1 chose alike
 NEAR_PAIRS = 12  # pairs of near pilots per pilot that tell the weights: 6 to 40 took 0.7 to 1 times the work
 SWEEPS = 50  # over the weights: scipy's to eight digits, but for axes that tell the same twice

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from results_schema.arrays import Array
+from results_schema.arrays import Array, Mask
 from results_schema.status import Status
 from studies.findings.absolute_errors import LEAST_PART
 from studies.findings.beyond import LIMIT, limits_of
@@ -49,20 +49,11 @@ def _judged(results: Results, sensor: str, limit: float) -> str:
     errors = [results.dataset[f"{side}_error"].sel(result=name).transpose(*results.dims).values for side, name in ends]
     beyond = np.nan_to_num(np.maximum(*sizes)) > limit
     said = f"{LIMIT}{quantity(limit, results.sensors[sensor])}"
-    # As parts of the true value, which may be larger by as much; an error that nobody knows counts as none.
-    most = [
-        size / np.maximum(1.0 - np.nan_to_num(error), LEAST_PART) for size, error in zip(sizes, errors, strict=True)
-    ]
+    # As parts of the true value, which may be larger by as much; where no estimate exists by any part.
+    off = [np.nan_to_num(error, nan=1.0) for error in errors]
+    most = [size / np.maximum(1.0 - error, LEAST_PART) for size, error in zip(sizes, off, strict=True)]
     perhaps = ~beyond & (np.nan_to_num(np.maximum(*most)) > limit)
-    if perhaps.any():
-        within = percent(float(np.nanmax(np.where(perhaps, np.fmax(*errors), np.nan))))
-        where = f" in {int(perhaps.sum()):,} more of them" if beyond.any() else ""
-        doubt = (
-            f"; by estimated errors of up to {within} perhaps{where or ' somewhere'}, which a tolerance of its own on "
-        )
-        doubt += f"sensor {sensor} tells"
-    else:
-        doubt = ""
+    doubt = _doubt(perhaps, np.maximum(*errors), "in more of them" if beyond.any() else "somewhere", sensor)
     opened = "; those whose contact opens count too" if Status.SEPARATED in results.status_counts else ""
     if not beyond.any():
         return f"{said} nowhere{doubt}."
@@ -72,6 +63,16 @@ def _judged(results: Results, sensor: str, limit: float) -> str:
     return (
         f"{said} in some variants of {many} of {counted(results.size, 'cell')}{_along(results, beyond)}{opened}{doubt}."
     )
+
+
+def _doubt(perhaps: Mask, errors: Array, where: str, sensor: str) -> str:
+    """That cells of a sensor may be beyond a limit by what their extremes are off; "" where none may. errors: of these,
+    NaN where no estimate exists."""
+    if not perhaps.any():
+        return ""
+    most = float(errors[perhaps].max())
+    why = "where no estimate exists" if np.isnan(most) else f"by estimated errors of up to {percent(most)}"
+    return f"; {why} perhaps {where}, which a tolerance of its own on sensor {sensor} tells"
 
 
 def _along(results: Results, beyond: Array) -> str:

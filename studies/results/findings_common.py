@@ -153,19 +153,21 @@ def remedy(results: Results) -> str:
     it."""
     if Status.TOLERANCE_MISSED not in results.status_counts or label(Status.TOLERANCE_MISSED) in results.study.expected:
         return ""
-    missed = [name.rpartition(" ")[2] for name in _missed(results)]
+    missed = [(name.rpartition(" ")[2], error) for name, (error, _) in _missed(results).items()]
     ends = ("", "_max", "_min", "_residual", f"{AFTER_STOP}_max", f"{AFTER_STOP}_min")
     read = {f"{name}{end}": name for name in results.sensors for end in ends}
-    sensors = list(dict.fromkeys(read[name] for name in missed if name in read))
+    sensors = list(dict.fromkeys(read[name] for name, _ in missed if name in read))
     if missed and not sensors:
         return " What helps: a larger `solver.tolerance`."
     more = [f"{len(sensors) - MOST_MISSED} more"] if len(sensors) > MOST_MISSED else []
     names = listed([*sensors[:MOST_MISSED], *more])
     where = f"the sensor{'s' if len(sensors) > 1 else ''} {names}" if sensors else "sensors"
-    largest = max((error for error, _ in _missed(results).values()), default=np.inf)
-    own = f"`tolerance = {_reached(largest)}` on {where}, which holds,"
-    without = f'`tolerance = "told"` on {where}, so that errors are estimated and not held,'
-    helps = f" What helps: {own if largest < REACHED else without} or a larger tolerance"
+    largest = max((error for name, error in missed if name in read), default=np.inf)
+    if largest < REACHED:
+        own = f"`tolerance = {_reached(largest)}` on {where}, which holds"
+    else:
+        own = f'`tolerance = "told"` on {where}, so that errors are estimated and not held'
+    helps = f" What helps: {own}, or a larger tolerance"
     moving = results.study.carriage.items()
     jumps = [(name, one.motion.smoothed_by) for name, one in moving if "along" in one.pushes and one.motion.smoothed_by]
     smooth = listed([f"carriage.{name}.motion.{key}" for name, key in jumps])

@@ -287,3 +287,5 @@ def test_limits_that_cells_keep_but_for_estimated_errors_are_no_verdict(whole: x
     first = studies.answer(dataset)[0]
     assert first.count("(estimated to within 16 %)") == 2
     assert "nowhere; by estimated errors of up to 16 % perhaps somewhere, which a tolerance of its own on" in first
+    dataset["largest_error"].loc[{"result": "quarter_max"}] = np.nan
+    assert "nowhere; where no estimate exists perhaps somewhere, which a tolerance of" in studies.answer(dataset)[0]
