@@ -30,6 +30,10 @@ from results_schema.arrays import Array, Counts
 #: Modes x steps over a passage or cycle of one march at most: some ten milliseconds. 24 modes and 4,800 steps hold 1e-3
 #: for the hardest passage of accuracy.md; undamped loads that step on free ends needed a hundred times that at 1e-4.
 MOST_WORK = 3e7
+#: Where a study fixes steps: times its own that levels take at most, so that a sixteenth of what these are off by is
+#: left; and of the work of their first modes. With a million steps whose values were right to 1e-12 estimated errors
+#: were 3e-2 where every level took twice the steps, up to the work above.
+MOST_OF_FIXED, MOST_WORK_OF_FIXED = 4.0, 16.0
 FIRST_PERIODS = 20  # steps per first period of schemes without a limit at level 0: 8e-3 of phase at most
 #: The same up to which no mode takes mass (four of a beam need 50 to 110): where loads step onto a free end, with 20 to
 #: 80 and no such rule, 5 to 8 % of variants that hold 1e-3 were marked.
@@ -282,16 +286,17 @@ def _by(grid: SceneGrid, values: VariantValues, levels: Levels, level: int) -> C
     if levels.steps == "as the study says":
         return np.ones(values.size, dtype=np.int64)
     model = grid.model(levels.numerics[level])
-    # Of steps that the study fixes twice as many each time: levels that all took its own would not tell their error.
-    wanted = np.full(values.size, max(unit_steps(grid.scene) * 4.0**level, grid.unit * 2.0**level))
+    # Of steps that the study fixes twice as many at first: levels that all took its own would not tell their error.
+    most = grid.unit * (MOST_OF_FIXED if grid.fixed else np.inf)
+    wanted = np.full(values.size, max(unit_steps(grid.scene) * 4.0**level, min(grid.unit * 2.0**level, most)))
     own = MARGIN * least_steps(model, values)
     if level:  # what few modes decide tells of steps alone, also where the last modes are hardly more than those before
-        own = np.maximum(own, 2.0 * grid.unit * _by(grid, values, levels, level - 1))
+        own = np.maximum(own, np.minimum(2.0 * grid.unit * _by(grid, values, levels, level - 1), most))
     periods = values.scene_time_scale * model.first_omega / (2.0 * np.pi)
     if np.isfinite(model.scheme.scaled_from):
         whole = float(model.omega.max()) * values.scene_time_scale / model.scheme.scaled_from
-        most = FIRST_WHOLE if open_bodies(grid.scene.study) else FIRST_PERIODS  # of modes that a study fixes few move
-        own = np.maximum(own, np.minimum(whole, most * 4.0**level * periods))
+        first = FIRST_WHOLE if open_bodies(grid.scene.study) else FIRST_PERIODS  # of modes that a study fixes few move
+        own = np.maximum(own, np.minimum(whole, first * 4.0**level * periods))
     elif not np.isfinite(model.scheme.stability_limit):
         own = np.maximum(own, FIRST_PERIODS * 4.0**level * periods)
     return np.asarray(np.exp2(np.ceil(np.log2(np.maximum(wanted, own) / grid.unit).clip(0.0) - 1e-9)), dtype=np.int64)
@@ -302,7 +307,9 @@ def _may_march(grid: SceneGrid, values: VariantValues, levels: Levels, level: in
     if levels.steps == "as the study says":
         numerics = levels.numerics[level]
         return np.asarray(least_steps(grid.model(numerics), values) <= grid.unit * numerics.scheme.stride)
-    return level_work(grid, values, levels, level) <= MOST_WORK
+    first = grid.model(levels.numerics[0])
+    own = first.body_modes * grid.unit * first.scheme.stride if grid.fixed else 0
+    return level_work(grid, values, levels, level) <= max(MOST_WORK, MOST_WORK_OF_FIXED * own)
 
 
 def is_last(grid: SceneGrid, values: VariantValues, levels: Levels, used: Flat) -> NDArray[np.bool_]:

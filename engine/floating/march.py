@@ -69,17 +69,17 @@ def march(
     statistics, history, settled, codes, last = (out_of_blocks(part, V) for part in kept)
     first = model.signal_of("carriages") + CONTACT_FORCE
     pulls = statistics[:, first : model.signal_of("ends") : OF_CARRIAGE, layout.SMALLEST] < 0.0
-    lifts = np.any(pulls & _lies(model, table.gravity, history[:, 0]), axis=1)
+    lifts = np.any(pulls & _may_lift(model, table.gravity, history[:, 0]), axis=1)
     status = gravest(STATUS[codes], np.where(lifts, np.int8(Status.SEPARATED), np.int8(Status.OK)))
     return Marched(statistics, history, stations * h[:, None], status, h, last, table.stops, settled)
 
 
-def _lies(model: FloatingModel, gravity: Array, signals: Array) -> Mask:
-    """(V, C) whether weight presses carriages onto their tracks, by the signals (V, ...) at time 0. Without gravity,
-    and where they stand upright, these hold what moves on them from both sides."""
+def _may_lift(model: FloatingModel, gravity: Array, signals: Array) -> Mask:
+    """(V, C) whether nothing but weight presses carriages onto their tracks, by the signals (V, ...) at time 0. Without
+    gravity, and where they stand upright, these hold what moves on them from both sides."""
     names, frames = list(model.bodies), model.signal_of("frames") + BODY_ATTITUDE
     first = [frames + OF_BODY * names.index(carriage.on) for carriage in model.study.carriage.values()]
     normal = np.stack([signals[:, np.add.outer(first, 3 * i + 2).astype(int)] for i in range(3)], axis=2)
-    return np.asarray(
-        np.einsum("vi,vci->vc", gravity, normal) > LEAST_WEIGHT * np.linalg.norm(gravity, axis=1)[:, None]
-    )
+    presses = np.einsum("vi,vci->vc", gravity, normal) > LEAST_WEIGHT * np.linalg.norm(gravity, axis=1)[:, None]
+    rests = np.array([carriage.may_lift for carriage in model.study.carriage.values()], dtype=np.bool_)
+    return np.asarray(presses & rests)

@@ -248,9 +248,9 @@ def _pressing(tables: SceneTables, values: VariantValues, carriage: int) -> Flat
 
 
 def _opened_at(tables: SceneTables, marched: Marched, carriage: int) -> Array:
-    """(V,) count of the first station with a negative contact force of a carriage with inertia, or -1."""
+    """(V,) count of the first station at which a carriage would lift off, or -1."""
     contacts = _contacts_of(tables.model, carriage)
-    if not tables.model.reacts(carriage):
+    if not tables.model.may_lift(carriage):
         return np.full(marched.statistics.shape[-1], -1.0)
     after = [len(tables.sensors) + number for number in contacts]
     below = np.concatenate([marched.unrecorded[contacts, layout.BELOW_AT], marched.statistics[after, layout.BELOW_AT]])
@@ -268,8 +268,8 @@ def _status(model: SceneModel, marched: Marched) -> tuple[NDArray[np.int8], NDAr
     bad = np.concatenate([marched.statistics[:, layout.DIVERGED_AT], marched.unrecorded[:, layout.DIVERGED_AT]])
     first = np.min(np.where(bad >= 0.0, bad, np.inf), axis=0)
     sensors = len(marched.statistics) - len(marched.unrecorded)
-    reactive = [number for number, force in enumerate(contacts_that_react(model)) if model.reacts(force.carriage)]
-    both = marched.statistics[[sensors + c for c in reactive]], marched.unrecorded[reactive]
+    lifting = [number for number, force in enumerate(contacts_that_react(model)) if model.may_lift(force.carriage)]
+    both = marched.statistics[[sensors + c for c in lifting]], marched.unrecorded[lifting]
     below = np.concatenate([part[:, layout.BELOW_AT] for part in both])
     separated = (below >= 0.0).any(axis=0)
     status = np.where(separated, np.int8(Status.SEPARATED), np.int8(Status.OK))

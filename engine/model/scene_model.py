@@ -220,6 +220,10 @@ class SceneModel:
         """Whether the contact force of a carriage depends on how its body moves."""
         return self.carriages[carriage].inertia != "force" or bool(self.springs_of(carriage))
 
+    def may_lift(self, carriage: int) -> bool:
+        """Whether the carriage would lift off where its contact force turns negative."""
+        return self.reacts(carriage) and self.study.carriage[self.carriages[carriage].name].may_lift
+
     @property
     def fidelity(self) -> Fidelity:
         """The model that this scene marches: the fullest of its carriages'."""

@@ -32,6 +32,9 @@ POINT = (
     'is kind = "body", with the length of that body'
 )
 
+HOLDS_DOWN = "guided", "clamped", "preloaded", "holds", "hold_down", "uplift", "lifts", "unilateral"
+BILATERAL = "bilateral = true: its guide also pulls, so that nothing lifts off (left out: it rests by its weight)"
+
 
 class Suspension(NamedTuple):
     """A mass (kg) on a spring (N/m) and a damper (N s/m) over the point that a carriage touches."""
@@ -88,6 +91,11 @@ class Carriage(SpecOfKind):
     def reacts(self) -> bool:
         """Whether its contact force may be another than its keys say: a plain force presses as it is written."""
         return bool(self.masses)
+
+    @property
+    def may_lift(self) -> bool:
+        """Whether it would lift off where its contact force turns negative."""
+        return self.reacts
 
     @property
     def suspension(self) -> Suspension | None:
@@ -163,7 +171,22 @@ class ForceCarriage(Carriage):
     force: Force
 
 
-class PushingCarriage(Carriage):
+class GuidedCarriage(Carriage):
+    """Base of those that a guide may hold from both sides.
+
+    bilateral: whether its guide pulls too, as a profile rail does: nothing lifts off, whatever the contact force.
+    """
+
+    looked_for: ClassVar[Mapping[str, str]] = {**Carriage.looked_for, **dict.fromkeys(HOLDS_DOWN, BILATERAL)}
+
+    bilateral: bool = False
+
+    @property
+    def may_lift(self) -> bool:
+        return self.reacts and not self.bilateral
+
+
+class PushingCarriage(GuidedCarriage):
     """Base of those whose inertia may act in other directions than their loads, in which it always does.
 
     inertia_along: the mass also pushes along its track, by -m (s'' + u''), u the motion of the track along itself.
@@ -200,7 +223,7 @@ class OscillatorCarriage(PushingCarriage):
 
     masses: ClassVar[tuple[str, ...]] = ("mass", "wheel_mass")
     touching: ClassVar[tuple[str, ...]] = ("wheel_mass",)
-    looked_for: ClassVar[Mapping[str, str]] = dict(Carriage.looked_for) | LIKE_OSCILLATORS
+    looked_for: ClassVar[Mapping[str, str]] = dict(GuidedCarriage.looked_for) | LIKE_OSCILLATORS
 
     kind: Literal["oscillator"]
     mass: Mass = Field(gt=0)
@@ -270,7 +293,7 @@ class Contact(Spec):
 NO_PUSH = "braking does not act on bodies on contacts: what rides pushes neither along nor across the track"
 
 
-class BodyCarriage(Carriage):
+class BodyCarriage(GuidedCarriage):
     """Another body of the study, which nothing else holds, on shoes or wheels; its weight acts.
 
     reference: m along its own track, the place that the motion moves; the middle of its track if not given. Its track
@@ -279,7 +302,7 @@ class BodyCarriage(Carriage):
     """
 
     looked_for: ClassVar[Mapping[str, str]] = {
-        **Carriage.looked_for,
+        **GuidedCarriage.looked_for,
         **dict.fromkeys(("inertia_along", "inertia_across"), NO_PUSH),
     }
 

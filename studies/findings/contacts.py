@@ -7,12 +7,12 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from results_schema.arrays import Array, Mask
-from studies.findings.absolute_errors import absolute_errors, weight
+from studies.findings.absolute_errors import absolute_errors, told_error, weight
 from studies.findings.amplification import sizes
 from studies.findings.beyond import MOST_TOLD, where
 from studies.findings.effects import unchanged
 from studies.results.axes import PACES, VARIANT, Axis
-from studies.results.findings_common import in_words, uncertainty
+from studies.results.findings_common import in_words
 from studies.results.formatting import ALIKE, ROUNDING, counted, listed, number, quantity
 from studies.results.places import Index, chosen, extreme
 from studies.results.results import Results
@@ -24,10 +24,11 @@ ASIDE = ", the last 2 % before a held end aside"
 
 
 def told_contacts(results: Results) -> tuple[list[str], list[str]]:
-    """Sentences on carriages that would lift off, and on those that keep their contact."""
-    opened = _opened(results)
-    kept = {name: force for name, force in _contact_forces(results) if name not in opened}
-    return [_lifted(results, opened)] if opened else [], _kept(results, kept)
+    """Sentences on carriages that would lift off, and on those that keep their contact or are held by guides."""
+    opened, known = _opened(results), results.study.carriage
+    kept = {name: force for name, force in _contact_forces(results) if name not in opened and known[name].may_lift}
+    guided = [_guided(results, *one) for one in _contact_forces(results) if not known[one[0]].may_lift]
+    return [_lifted(results, opened)] if opened else [], [*_kept(results, kept), *guided[:MOST_TOLD]]
 
 
 def told_low_contacts(results: Results, least: float | None) -> list[str]:
@@ -111,7 +112,7 @@ def _pull(results: Results, sensor: str) -> str:
 
 
 def _contact_forces(results: Results) -> Iterator[tuple[str, Array]]:
-    """Carriages with their smallest contact forces, where these are known and tell of lifting off."""
+    """Carriages with their smallest contact forces, where these are known and depend on how bodies move."""
     for carriage, spec in results.study.carriage.items():
         if f"{carriage}_contact_force_min" in results.dataset and spec.inertial:
             force = np.asarray(results.dataset[f"{carriage}_contact_force_min"].values, dtype=np.float64)
@@ -121,9 +122,21 @@ def _contact_forces(results: Results) -> Iterator[tuple[str, Array]]:
 
 def _opened(results: Results) -> dict[str, tuple[Mask, Mask]]:
     """Where contact forces turn negative and where they are known, by carriage: most variants first."""
-    masks = {name: (np.isfinite(force) & (force < 0.0), np.isfinite(force)) for name, force in _contact_forces(results)}
+    lifting = [one for one in _contact_forces(results) if results.study.carriage[one[0]].may_lift]
+    masks = {name: (np.isfinite(force) & (force < 0.0), np.isfinite(force)) for name, force in lifting}
     found = [(name, both) for name, both in masks.items() if both[0].any()]
     return dict(sorted(found, key=lambda one: -np.count_nonzero(one[1][0])))
+
+
+def _guided(results: Results, carriage: str, force: Array) -> str:
+    """How much a guide that holds from both sides pulls."""
+    place = extreme(-force)
+    assert place is not None
+    least, where_ = float(force[place]), in_words(results, place)
+    off = told_error(float(absolute_errors(results, f"{carriage}_contact_force_min")[place]), least, "N")
+    if least < 0.0:
+        return f"The guide of {carriage} holds it down with up to {quantity(-least, 'N')}{off}{where_}."
+    return f"The guide of {carriage} pulls nowhere: the smallest contact force is {quantity(least, 'N')}{off}{where_}."
 
 
 def _lifted(results: Results, opened: dict[str, tuple[Mask, Mask]]) -> str:
@@ -151,7 +164,7 @@ def _kept(results: Results, forces: dict[str, Array]) -> list[str]:
     keeps, of = ("keep their", f", that of {lowest},") if len(certain) > 1 else ("keeps its", "")
     place = extreme(-forces[lowest])
     assert place is not None
-    force = f"{quantity(least[lowest], 'N')}{uncertainty(results, f'{lowest}_contact_force_min', place)}"
+    force = f"{quantity(least[lowest], 'N')}{told_error(off[lowest], least[lowest], 'N')}"
     smallest = f"the smallest contact force{of} is {force}{in_words(results, place)}"
     all_over = f"everywhere{ASIDE if _is_read(results) else ''}"
     return [*found, f"{who} {keeps} contact {all_over}; {smallest}{_nearest_to_lifting(results, lowest, place)}."]

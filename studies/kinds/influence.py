@@ -92,10 +92,10 @@ class Influence(AtRestKind):
             line = np.where(first, found.influence[:, j], np.nan)
             named[f"{sensor}_influence"] = np.broadcast_to(line, found.sensors.shape[:2]).copy()
         touching = contact_forces(model)
-        reacts = np.array([model.reacts(contact.carriage) for contact in touching])
+        may_lift = np.array([model.may_lift(contact.carriage) for contact in touching])
         contacts = np.where(_on_bodies(along, [contact.rides(model) for contact in touching]), found.contacts, np.nan)
         size = np.nanmax(np.abs(contacts), axis=(1, 2), keepdims=True, initial=0.0)
-        named["opened"] = ((contacts < -LIFTS * size) & reacts).any(axis=2)
+        named["opened"] = ((contacts < -LIFTS * size) & may_lift).any(axis=2)
         return {**named, "contact_force": contacts}
 
     def shapes(self, model: SceneModel, along: Along) -> dict[str, NDArray[Any]]:

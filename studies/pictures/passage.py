@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from functools import partial, reduce
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure as Drawing
@@ -42,6 +42,19 @@ from studies.results.results import Results
 MOST_HISTORIES = 4
 CURVES = (".mass", *DAMPING, ".force")  # by what they tell: a force multiplies all that it does by the same factor
 DOTTED, SAME = re.compile(r"Dotted: .*?\.(?= |$)"), "Dotted: the speeds of the figure before."
+
+
+class _Below(NamedTuple):
+    """What carriages do where their contact force is negative; name: of the figure of several."""
+
+    name: str
+    title: str
+    caption: str
+    legend: str
+
+
+RESTING = _Below("contact", "would lift off", "the carriage would lift off", "contact opens")
+GUIDED = _Below("contact-guided", "is held down by its guide", "the guide of the carriage pulls", "its guide pulls")
 FLAT = 0.1  # a map of ratios that vary less shows nothing
 
 
@@ -72,7 +85,9 @@ def pictures(results: Results) -> list[Figure]:
             first += _map_of_sizes(results, sensors[0], limits)
         first += [_map(seen, sensors[0])] if telling else []
         touching = [name for name in results.study.carriage if _has_contact(seen, name)]
-        first += [_contact(seen, touching)] if touching else []
+        resting = [name for name in touching if results.study.carriage[name].may_lift]
+        guided = [name for name in touching if name not in resting]
+        first += [_contact(seen, some, words) for some, words in ((resting, RESTING), (guided, GUIDED)) if some]
     size = np.where(results.with_values, sizes(results, sensors[0]), np.nan)
     shown = picked(results, size, MOST_HISTORIES)
     on_the_way = [response(results, sensors, limits, shown, top)] if shown else []
@@ -163,7 +178,7 @@ def _draw_map(seen: View, sensor: str, drawing: Drawing) -> None:
     colour_bar(axes, mesh, "dynamic amplification")
 
 
-def _contact(seen: View, carriages: list[str]) -> Figure:
+def _contact(seen: View, carriages: list[str], words: _Below) -> Figure:
     """One figure for all carriages: a curve for each, or of many, and in maps, the smallest of all."""
     force, several = _smallest_force(seen, carriages), len(carriages) > 1
     alike = ""
@@ -173,19 +188,19 @@ def _contact(seen: View, carriages: list[str]) -> Figure:
     caption = seen.caption(
         "Smallest contact force over the weight, without the last 2 % of a way towards a held end.",
         f"Of {len(carriages)} carriages the smallest." if several and not _apart(seen, carriages) else "",
-        f"Below zero the carriage would lift off{line}.",
+        f"Below zero {words.caption}{line}.",
         alike,
     )
     least = float(np.nanmin(seen.plane(force)))
     who, keeps, its = (f"{len(carriages)} carriages", "keep", "their") if several else (carriages[0], "keeps", "its")
     title = f"{who} {keeps} {its} contact, with at least {number(least, 2)} of {its} weight"
     if least < 0.0:
-        title = f"{f'The first of {who}' if several else who} would lift off{_from(seen, force)}"
+        title = f"{f'The first of {who}' if several else who} {words.title}{_from(seen, force)}"
     elif float(np.nanmin(force)) < 0.0:
-        title = f"{who} {keeps} {its} contact in this part of the sweep, and would lift off in another"
+        title = f"{who} {keeps} {its} contact in this part of the sweep, and {words.title} in another"
     height = 3.4 if _in_plane(seen) else 2.8
-    name = "contact" if several else f"contact-{who}"
-    return draw(name, title, caption, height, partial(_draw_contact, seen, carriages))
+    name = words.name if several else f"contact-{who}"
+    return draw(name, title, caption, height, partial(_draw_contact, seen, carriages, words))
 
 
 def _apart(seen: View, carriages: list[str]) -> bool:
@@ -234,7 +249,7 @@ def _in_plane(seen: View) -> bool:
     return seen.y is not None and (seen.is_sampled or len(seen.y.values) > MANY)
 
 
-def _draw_contact(seen: View, carriages: list[str], drawing: Drawing) -> None:
+def _draw_contact(seen: View, carriages: list[str], words: _Below, drawing: Drawing) -> None:
     force = _smallest_force(seen, carriages)
     axes = drawing.subplots()
     if len(carriages) > 1 and _apart(seen, carriages):
@@ -256,4 +271,4 @@ def _draw_contact(seen: View, carriages: list[str], drawing: Drawing) -> None:
         x, y = seen.along(seen.x), seen.along(seen.y)
         axes.contour(x, y, seen.plane(force).T, [0.0], colors=look.VERMILION, linewidths=1.8)
         line = Line2D([], [], color=look.VERMILION, linewidth=1.8)
-        axes.legend([line], ["contact opens"], loc="lower right", framealpha=0.85, frameon=True)
+        axes.legend([line], [words.legend], loc="lower right", framealpha=0.85, frameon=True)

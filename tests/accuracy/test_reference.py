@@ -192,6 +192,17 @@ def test_no_two_levels_are_the_same_march(modes: Any, scheme: str) -> None:
         assert len(work) >= 4 and np.all(np.diff(work, axis=0) > 0.0)
 
 
+def test_levels_of_many_fixed_steps_double_the_modes_twice_at_least() -> None:
+    """Each took twice the steps, and so many that no second one was worth its work: estimated errors grew with the
+    steps of a study, while its values were right."""
+    grid = only_grid(passages(2, bed=OPEN | {"modes": 10}, solver={"steps": 200_000}))
+    found = in_full(grid)
+    work = np.array([level_work(grid, grid.values, found, level)[0] for level in range(4)])
+    np.testing.assert_allclose(work, 2e6 * np.array([1.0, 2.0 * 2.0, 4.0 * 4.0, 6.4 * 4.0]))
+    converged = converge(Marches(grid, grid.values, found), 1e-9)
+    assert np.all(converged.level == 2) and converged.error.max() < 1e-4
+
+
 def test_a_train_is_told_about_what_it_is_off_by() -> None:
     """Forces that enter one after the other: what they bend converges fast, what they shake slowly."""
     axles = {f"axle{n}": force(1.0, cruise(0.0, 1.0, 0.8), headway=0.12 * n) for n in range(4)}
