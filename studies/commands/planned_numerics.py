@@ -12,6 +12,7 @@ from engine.march.outcome import Flat, used
 from results_schema.arrays import Array, Mask
 from results_schema.status import Fidelity, SchemeUsed, label
 from studies.findings.numerics_used import NAMES
+from studies.results.findings_common import tolerance_for
 from studies.results.formatting import counted, scientific, spanned
 from studies.results.places import spread
 
@@ -131,5 +132,5 @@ def told_missed(plan: Plan, parts: Sequence[Part]) -> str:
     is_sensor = found.result.of in plan.study.sensor
     of = f"the history of {found.result.of}" if found.result.name in plan.study.sensor else found.result.name
     how_far = f"{scientific(found.error)} where {scientific(found.asked)} is asked, for {of}"
-    own = f', or tolerance = "told" on sensor {found.result.of}' if is_sensor else ""
+    own = f", or tolerance = {tolerance_for(found.error)} on sensor {found.result.of}" if is_sensor else ""
     return f"{who} would miss their tolerance whatever is tried ({how_far}); remedy: a larger one{own}"

@@ -163,19 +163,19 @@ def remedy(results: Results) -> str:
     names = listed([*sensors[:MOST_MISSED], *more])
     where = f"the sensor{'s' if len(sensors) > 1 else ''} {names}" if sensors else "sensors"
     largest = max((error for name, error in missed if name in read), default=np.inf)
-    if largest < REACHED:
-        own = f"`tolerance = {_reached(largest)}` on {where}, which holds"
-    else:
-        own = f'`tolerance = "told"` on {where}, so that errors are estimated and not held'
-    helps = f" What helps: {own}, or a larger tolerance"
+    why = "which holds" if largest < REACHED else "so that errors are estimated and not held"
+    helps = f" What helps: `tolerance = {tolerance_for(largest)}` on {where}, {why}, or a larger tolerance"
     moving = results.study.carriage.items()
     jumps = [(name, one.motion.smoothed_by) for name, one in moving if "along" in one.pushes and one.motion.smoothed_by]
     smooth = listed([f"carriage.{name}.motion.{key}" for name, key in jumps])
     return f"{helps}; or {smooth}, as forces of inertia that jump strike every mode." if jumps else f"{helps}."
 
 
-def _reached(error: float) -> str:
-    """The next larger tolerance of 1, 2 or 5 times a power of ten that leaves room."""
+def tolerance_for(error: float) -> str:
+    """A tolerance that what has this estimated error holds, as a study file writes it: the next larger one of 1, 2 or 5
+    times a power of ten that leaves room, or none at all."""
+    if not error < REACHED:
+        return '"told"'
     decade = 10.0 ** np.floor(np.log10(error))
     return f"{next(part * decade for part in (1.0, 2.0, 5.0, 10.0, 20.0) if part * decade >= ROOM * error):g}"
 

@@ -109,9 +109,9 @@ def test_errors_are_told_beside_the_tolerance_of_the_same_result() -> None:
     parts = list(converged(found, known, np.array([1.0, 1.0])))
     assert rows(found, parts[:1]) == [("1", "moving mass", "4", "average-acceleration", "100", "1e-4", "1e-3")]
     assert rows(found, parts)[0][-2:] == ("5e-3", "1e-3")
-    assert told_missed(found, parts[:1]) == "" and "5e-3 where 1e-3 is asked, for tight_max" in told_missed(
-        found, parts
-    )
+    missed = told_missed(found, parts)
+    assert told_missed(found, parts[:1]) == "" and "5e-3 where 1e-3 is asked, for tight_max" in missed
+    assert missed.endswith("or tolerance = 0.01 on sensor tight")
     unknown = [part._replace(error=np.full_like(part.error, np.nan)) for part in parts]
     assert rows(found, unknown)[0][-2:] == ("unknown", "") and told_missed(found, unknown) == ""
 
