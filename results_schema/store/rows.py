@@ -21,6 +21,7 @@ Arrays = dict[str, np.ndarray]
 
 VARIANTS = "variants"
 _SELECTED = "/selected"
+_NAMES, _PLACES, _COLUMN = "names", "places", "column"  # of arrays: the number of their column, and which of it
 SECONDS_PER_PART, BYTES_PER_PART = 0.5, 32 * 2**20  # of chunks that share one
 
 
@@ -258,18 +259,23 @@ def _stacked(arrays: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def _table(rows: Rows) -> Table:
+    """Rows as a table: arrays of a type and shape in one column, as a column costs a file as much as some ten thousand
+    numbers, and a train of 24 axles has 200 results."""
     variants = np.ascontiguousarray(rows.variants, np.int64)
     if variants.ndim != 1 or variants.size == 0 or variants.min() < 0:
         raise ValueError(f"variants: expected (n > 0,) numbers >= 0, received shape {variants.shape}")
-    if VARIANTS in rows.arrays:
-        raise ValueError(f"an array is called {VARIANTS!r}, the name of the numbers of the variants")
-    arrays = {VARIANTS: variants, **rows.arrays}
-    for name, array in arrays.items():
+    alike: dict[tuple[np.dtype[Any], tuple[int, ...]], list[str]] = {}
+    for name, array in rows.arrays.items():
         if array.shape[:1] != variants.shape or array.size == 0 or array.dtype.kind not in "iuf":
             raise ValueError(f"{name}: expected numbers ({variants.size}, ...), received {array.dtype} {array.shape}")
-    return from_arrays(arrays)
+        alike.setdefault((array.dtype, array.shape), []).append(name)
+    columns = {f"{_COLUMN}{n}": np.stack([rows.arrays[one] for one in names]) for n, names in enumerate(alike.values())}
+    places = {one: (n, k) for n, names in enumerate(alike.values()) for k, one in enumerate(names)}
+    named = {_NAMES: np.array(list(rows.arrays), dtype=object), _PLACES: np.array([places[one] for one in rows.arrays])}
+    return from_arrays({VARIANTS: variants, **(named if columns else {}), **columns})
 
 
 def _rows(table: Table) -> Rows:
-    arrays = {name: column.data for name, column in table.columns.items()}
-    return Rows(arrays.pop(VARIANTS), arrays)
+    columns = {name: column.data for name, column in table.columns.items()}
+    found = zip(columns.get(_NAMES, ()), columns.get(_PLACES, ()), strict=True)
+    return Rows(columns[VARIANTS], {name: columns[f"{_COLUMN}{n}"][k] for name, (n, k) in found})
