@@ -123,7 +123,7 @@ def _braking(plan: Plan) -> Iterator[str]:
     if number < 0 or (asked and told_of(plan.base, of_loads=True)):
         return
     tie = plan.base.carriages[number]
-    remedy = "frames take it with inertia_along = true"
+    remedy = "a track that moves along itself, as of frames and imported models that sway, takes inertia_along = true"
     if "along" in could.get(tie.name, ()):
         remedy = f"{study.source.written(f'carriage.{tie.name}')}.inertia_along = true brings it"
     elif study.carriage[tie.name].riding_body is not None:
@@ -366,12 +366,12 @@ def _time_scale(grid: SceneGrid) -> Array:
     return grid.values.scene_time_scale
 
 
-REMARKS: tuple[Callable[[Plan], Iterator[str]], ...]
-REMARKS = (
+REMARKS: tuple[Callable[[Plan], Iterator[str]], ...] = (
     _partly_inert,
     _braking,
     lambda plan: doubtful(plan.study, plan.cases),
     lambda plan: half_united(plan.study),
+    lambda plan: (f"{part.name}: {doubt}" for part in plan.base.bodies for doubt in part.modal.doubts),
     in_thousandths,
     far_apart,
     _unsupported,

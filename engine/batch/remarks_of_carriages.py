@@ -66,12 +66,7 @@ def _of_limit(plan: Plan, name: str, table: str, key: str) -> Iterator[str]:
 def stays_level(plan: Plan) -> Iterator[str]:
     """One sentence for every body of which contacts at one place of its own track stand one behind the other."""
     for name, carriage in plan.study.carriage.items():
-        found: dict[tuple[object, str], list[str]] = {}
-        for (key, contact), on in zip(carriage.riding_contacts.items(), carriage.ridden, strict=False):
-            if contact.at is not None and contact.offset is not None:
-                found.setdefault((contact.at, on), []).append(key)
-        level = [" and ".join(keys) for keys in found.values() if len(keys) > 1]
-        if level:
+        if level := [" and ".join(names) for names in carriage.level_contacts]:
             yield (
                 f"the body on carriage {name} does not pitch, as contacts of it hold it at one place of its track: "
                 f"{', '.join(level)} stay level, and press as if it were held so; a frame with a point at each pitches"

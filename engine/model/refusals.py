@@ -59,6 +59,7 @@ def check_rigid_modes(model: SceneModel) -> None:
             what, expected = "only rigid-body modes are kept", f"more than {part.modal.rigid_modes} modes"
             raise model.study.source.fault(f"body.{part.name}.modes", what, expected=expected)
         if part.modal.rigid_modes and model.study.start == "equilibrium":
-            what = "nothing holds this body, so it has no static equilibrium to start from"
+            free = f"{part.modal.rigid_modes} rigid motion{'s' if part.modal.rigid_modes > 1 else ''}"
+            what = f"nothing holds this body against {free}, so it has no static equilibrium to start from"
             remedy = 'hold it, a frame that may slide by supports.NODE = ["x"], or set initial = "rest"'
             raise BadInput(what, where=where, expected="supports that hold it in every direction", remedy=remedy)

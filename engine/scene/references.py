@@ -114,7 +114,8 @@ def _check_quantity(study: Study, here: str, name: str, quantity: str) -> None:
     """A body has the quantity that is read of it, and the keys that this needs."""
     body = study.body[name]
     if quantity in body.untold:
-        expected = f"one of {', '.join(told for told in quantities_of_a_body() if told not in body.untold)}"
+        told = [one for one in quantities_of_a_body() if body.tells_supports or not QUANTITIES[one].of_support]
+        expected = f"one of {', '.join(one for one in told if one not in body.untold)}"
         raise study.source.fault(f"{here}.quantity", f"{quantity} is not available on body {name}", expected=expected)
     if QUANTITIES[quantity].needs_fibre and (missing := body.lacks_for_stress):
         what = f"a {quantity} sensor needs this key"

@@ -19,6 +19,10 @@ from studies.results.results import Results
 
 MOST_GROUPS = 5
 BEYOND = "The equations assume contact: beyond, they say no more."
+LEVEL = (
+    "may only seem to: its contacts at one place of its track stay level, as nothing there turns, and bear what the "
+    "track under them bends by; a frame with a point at each of them pitches."
+)
 #: Sensors read contact forces to the very end; smallest ones are of that span where they converge with the modes.
 ASIDE = ", the last 2 % before a held end aside"
 
@@ -146,7 +150,9 @@ def _lifted(results: Results, opened: dict[str, tuple[Mask, Mask]]) -> str:
     if left := others[MOST_TOLD:]:
         more.append(f"{len(left)} more")
     also = f" So would {listed(more)}." if more else ""
-    return f"{_onset(results, first, *masks)}{also} {BEYOND}"
+    level = [name for name in opened if results.study.carriage[name].level_contacts]
+    why = f" {listed(level[:MOST_TOLD])} {LEVEL}" if level else ""
+    return f"{_onset(results, first, *masks)}{also} {BEYOND}{why}"
 
 
 def _kept(results: Results, forces: dict[str, Array]) -> list[str]:

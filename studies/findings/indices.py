@@ -98,9 +98,10 @@ def asymmetry(legs: Legs, forward: float) -> Asymmetry:
 
     With odd = (f - b)/2, even = (f + b)/2 and R the range of the static response w_s: lag = <odd, w_s'>/<w_s', w_s'>,
     loop area = integral of (f - b) over the length x R, rms(odd)/R, rms(even - w_s)/R. forward: 1 where the way out
-    goes along the position, -1 against it. NaN where the static response does not vary but for rounding.
+    goes along the position, -1 against it. NaN where the static response does not vary but for rounding: of its own
+    size or, as of a spring that carries nothing at rest, of what it swings by.
     """
-    level = np.abs(legs.static).max(axis=0)
+    level = np.maximum.reduce([np.abs(part).max(axis=0) for part in (legs.static, legs.forward, legs.backward)])
     sums, rows = np.zeros((5, legs.size.size)), (legs.weight.size, legs.size.size)
     fields = (legs.forward, legs.backward, legs.static, forward * legs.slope)
     add_legs(legs.weight, *(np.ascontiguousarray(field).reshape(rows) for field in fields), sums)

@@ -171,7 +171,10 @@ TABLE = beam(length=0.2, supports="free-free")
     ("braked", "words"),
     [
         (swept("carriage.car.motion.acceleration", [2.0, 4.0], mass(0.1, STOP), output={"residual": True}), "0.4 N"),
-        (passing(car=mass(0.1, STOP), output={"residual": True}), "frames take it with inertia_along = true"),
+        (
+            passing(car=mass(0.1, STOP), output={"residual": True}),
+            "frames and imported models that sway, takes inertia_along = true",
+        ),
         (
             study(beam(), ON_CONTACTS, body={"bed": beam(), "table": TABLE}, output={"residual": True}),
             "bodies on contacts never push along",

@@ -229,8 +229,11 @@ def test_unconnected_frames_are_refused() -> None:
 
 def test_a_frame_that_nothing_holds() -> None:
     body = {key: value for key, value in BRIDGE.items() if key not in ("supports", "spring")} | {"own_weight": True}
-    with pytest.raises(BadInput, match="nothing holds this body"):
+    with pytest.raises(BadInput, match="nothing holds this body fully"):
         engine.run(load(write_document(STUDY | {"body": {"bridge": body}})))
+    hinged = body | {"supports": {next(iter(BRIDGE["supports"])): "pinned"}, "own_weight": False}
+    with pytest.raises(BadInput, match="nothing holds this body against 3 rigid motions, so"):
+        engine.run(load(write_document(STUDY | {"initial": "equilibrium", "body": {"bridge": hinged}})))
 
 
 def test_a_sensor_off_the_track() -> None:

@@ -111,6 +111,16 @@ def test_no_lag_where_the_static_response_does_not_vary() -> None:
     )
 
 
+def test_no_lag_of_what_carries_nothing_at_rest() -> None:
+    """A suspension force: its static response is rounding, beside what it swings by; 2e16 % were told."""
+    phase = np.linspace(0.0, 1.0, 65)[:, None, None]
+    swings, rounding = 700.0 * np.sin(9.0 * phase), 1e-12 * np.cos(40.0 * phase)
+    found = indices.asymmetry(indices.folded((0.1, 0.4), swings, rounding, 40.0 * rounding), 1.0)
+    assert all(np.isnan(value).all() for value in found)
+    known = indices.asymmetry(indices.folded((0.1, 0.4), swings, 1e14 * rounding, 4e15 * rounding), 1.0)
+    assert all(np.isfinite(value).all() for value in known)
+
+
 def test_the_way_back_ends_where_the_cycle_does() -> None:
     """A cycle that does not close: the way back comes from the value at phase 1, not from that at phase 0."""
     field = np.linspace(0.0, 3.0, 41)[:, None]

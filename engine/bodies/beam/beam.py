@@ -157,6 +157,10 @@ class Beam(Body):
         return not any(0.0 < s.at < self.length and s.stiffness > 0.0 for s in self.springs)
 
     @property
+    def tells_supports(self) -> bool:
+        return True
+
+    @property
     def untold(self) -> tuple[str, ...]:
         return ("axial_force",)  # loads act across it
 

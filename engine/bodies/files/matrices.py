@@ -34,7 +34,7 @@ def read_matrices(files: Mapping[str, str], options: Mapping[str, Any]) -> FileM
     held = np.zeros(len(owner), dtype=np.bool_)
     recovery = read_matrix(files["recovery"], file_bytes(files["recovery"])) if "recovery" in files else None
     model = FileModel(stiffness, mass, nodes, places, owner, direction, held, hashes_of(*files.values()), recovery)
-    return checked(model, files["stiffness"])
+    return checked(model, files["stiffness"], files)
 
 
 def read_matrix(path: str, raw: bytes) -> Any:

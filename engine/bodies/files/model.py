@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -98,14 +100,15 @@ def load_model(path: Path) -> FileModel:
         return FileModel(**matrices, **rest, hashes=hashes)
 
 
-def checked(model: FileModel, where: str) -> FileModel:
-    """The model with exactly symmetric matrices; where: the file of the matrices. Raises BadInput naming the node."""
+def checked(model: FileModel, where: str, own: Mapping[str, str] = MappingProxyType({})) -> FileModel:
+    """The model with exactly symmetric matrices; where: the file of the matrices, but of those that have one of their
+    ``own``. Raises BadInput naming the node."""
     if not len(model.nodes):
         raise BadInput("there is no node", where=where)
     _check_nodes(model, where)
     _check_rows(model, where)
-    matrices = {name: _checked_matrix(model, name, where) for name in _MATRICES}
-    return replace(model, **matrices, recovery=_checked_recovery(model, where))
+    matrices = {name: _checked_matrix(model, name, own.get(name, where)) for name in _MATRICES}
+    return replace(model, **matrices, recovery=_checked_recovery(model, own.get(_RECOVERY, where)))
 
 
 def _check_nodes(model: FileModel, where: str) -> None:

@@ -248,6 +248,10 @@ class Frame(Body):
                 return f"section.{section}.fibre_distance_lateral"
         return ""
 
+    @property
+    def tells_supports(self) -> bool:
+        return True
+
     def check_spot(self, spot: Spot) -> None:
         check_spot(self, spot)
 

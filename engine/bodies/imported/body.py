@@ -11,7 +11,7 @@ import numpy as np
 
 from engine.bodies.frame.body import settled
 from engine.bodies.frame.geometry import unit
-from engine.bodies.imported.findings import findings
+from engine.bodies.imported.findings import doubts, findings
 from engine.bodies.imported.line import (
     LinePushes,
     LineRecovered,
@@ -106,6 +106,7 @@ def _modal_body(body: Imported, spots: Spots) -> tuple[ModalBody, LineStatics]:
         gauges={name: _gauge(held, statics, load, parts, names, _pushed(sides, name)) for name, load in read},
         sides=sides,
         checks=findings(body, held, line),
+        doubts=doubts(body, held),
     )
     return found, statics
 

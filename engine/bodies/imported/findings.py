@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 
 FITS = 1e-6  # of the stiffness: less resists rigid motions by rounding
+DOUBTFUL = 1e-3  # of the stiffness: files with six digits of coordinates leave 1e-5
 SAME_MASS = 1e-6  # relative difference of the mass in three directions that is still one mass
 SHEAR = 0.02  # relative difference of rotations and slopes beyond which the spline is worth a thought
 
@@ -39,6 +40,17 @@ def findings(body: Imported, held: HeldModel, along: LineShapes) -> tuple[tuple[
         ("centre of mass", _centre(body, held)),
         ("track", _track(body, held)),
         ("slope between nodes", _slopes(body, held, along)),
+    )
+
+
+def doubts(body: Imported, held: HeldModel) -> tuple[str, ...]:
+    """What is likely a mistake: of a model that the study holds, a stiffness that moves otherwise than its nodes."""
+    resisted = _resisted(held)
+    if resisted is None or resisted < DOUBTFUL or not body.supports:
+        return ()
+    return (
+        f"{resisted:.2g} of its stiffness resists rigid motions by the coordinates of its nodes: unless its matrices "
+        "hold it besides its supports, nodes are in another unit (length_unit), or freedoms are exchanged",
     )
 
 

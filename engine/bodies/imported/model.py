@@ -179,17 +179,24 @@ def _solvable(file: FileModel, free: Counts, stiffness: Any, mass: Any, rigid: A
     try:
         found = factorised(stiffness, mass, rigid)
     except RuntimeError:
-        what = "parts of the body move freely without strain, other than as one rigid body"
-        raise BadInput(what, where="supports", expected="supports or springs that hold every part") from None
+        raise _loose("parts of the body move freely") from None
     factor = found.factor
     pivots = factor.U.diagonal()[factor.perm_c] / stiffness.diagonal()[found.kept]
     smallest = int(np.argmin(np.abs(pivots)))
     if abs(pivots[smallest]) < LOOSE:  # pivots after it are noise
         name = file.name(int(free[found.kept[smallest]]))
-        what = f"nothing holds {name}: part of the body moves without strain, other than as one rigid body"
-        raise BadInput(what, where="supports", expected="supports or springs that hold every part")
+        raise _loose(f"nothing holds {name}: part of the body moves")
     if pivots.min() < 0.0:
         count, name = int(np.count_nonzero(pivots < 0.0)), file.name(int(free[found.kept[int(np.argmin(pivots))]]))
         what = f"the stiffness matrix is not positive: {count} negative eigenvalue(s), first seen at {name}"
         raise BadInput(what, where="stiffness")
     return found
+
+
+def _loose(what: str) -> BadInput:
+    return BadInput(
+        f"{what} without strain, other than as one rigid body",
+        where="supports",
+        expected="supports or springs that hold every part",
+        remedy="hold it; or are nodes in another unit than the matrices (length_unit), or freedoms exchanged?",
+    )

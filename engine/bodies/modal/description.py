@@ -240,6 +240,11 @@ class Body(SpecOfKind):
         return ""
 
     @property
+    def tells_supports(self) -> bool:
+        """Whether it tells what its supports carry."""
+        return False
+
+    @property
     def untold(self) -> tuple[str, ...]:
         """Quantities that no sensor can read on this body."""
         return ()

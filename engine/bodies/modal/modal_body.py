@@ -209,6 +209,7 @@ class ModalBody:
     joints              inner places of the track, m, at which section forces jump or bend: supports, ends of members
     sections            section forces of bodies whose track is not one uniform beam; None: -E I w'' and its derivative
     checks              what a body out of foreign files was checked for, and what was found, in words
+    doubts              what of these is likely a mistake, in words
     """
 
     length: float
@@ -229,6 +230,7 @@ class ModalBody:
     gauges: Mapping[str, Gauge] = field(default_factory=dict)
     sides: Mapping[Direction, SideMotion] = field(default_factory=dict)
     checks: tuple[tuple[str, str], ...] = ()
+    doubts: tuple[str, ...] = ()
     _fixed: dict[tuple[float, int], Array] = field(default_factory=dict, init=False, repr=False)
 
     @property

@@ -47,6 +47,12 @@ def faults(folder: Path, files: Files) -> dict[str, tuple[dict[str, Any], list[s
         save_npz(folder / "heavy.npz", csc_matrix(wrong))
         return str(folder / "heavy.npz")
 
+    def negative() -> str:
+        wrong = files.assembly.mass.tolil()
+        wrong[at, at] = -1.0
+        save_npz(folder / "negative.npz", csc_matrix(wrong))
+        return str(folder / "negative.npz")
+
     def turning() -> str:
         save_npz(folder / "complex.npz", csc_matrix(files.assembly.mass * 1j))
         return str(folder / "complex.npz")
@@ -87,6 +93,7 @@ def faults(folder: Path, files: Files) -> dict[str, tuple[dict[str, Any], list[s
         "lopsided": ({"stiffness": matrix(lambda k: k.__setitem__((at, at - 2), 1e9))}, ["not symmetric", "node 5, z"]),
         "indefinite": ({"stiffness": matrix(lambda k: k.__setitem__((at, at), 1.0))}, ["not positive"]),
         "indefinite mass": ({"mass": heavy()}, ["bed.mass", "mass matrix is not positive"]),
+        "negative mass": ({"mass": negative()}, ["bed.mass", "negative.npz", "negative mass", "node 5, z"]),
         "complex": ({"mass": turning()}, ["bed.mass", "real numbers"]),
         "slack": ({"stiffness": matrix(lambda k: slack(k, at))}, ["node 5, z", "no stiffness", "bed.supports"]),
         "track node": ({"track": {"nodes": [1, 99]}}, ["bed.track.nodes.1", "99"]),
@@ -129,8 +136,9 @@ def test_faults(files: Files, tmp_path: Path) -> None:
 @pytest.mark.parametrize("quantity", ["stress", "bending_moment", "shear_force"])
 def test_no_section_forces(files: Files, quantity: str) -> None:
     sensor = {"middle": {"body": "bed", "at": 7.5, "quantity": quantity}}
-    with pytest.raises(BadInput, match=f"sensor.middle.quantity.*{quantity} is not available"):
+    with pytest.raises(BadInput, match=f"sensor.middle.quantity.*{quantity} is not available") as refused:
         study(files.table(), sensor=sensor)
+    assert "support" not in str(refused.value)  # which it refuses, too
 
 
 NARROW = ("%%MatrixMarket matrix array real general", "3 2", *["1.0"] * 6)

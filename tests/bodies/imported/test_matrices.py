@@ -12,6 +12,7 @@ from scipy.sparse.linalg import spsolve
 
 import engine
 from engine.batch.plan import make_plan
+from engine.batch.plausibility import remarks
 from engine.bodies.build import build_body
 from engine.bodies.imported.imported import Matrices
 from engine.bodies.modal.modal_body import ModalBody, gauge_at
@@ -115,6 +116,30 @@ def test_a_body_that_nothing_holds(loose: Files) -> None:
     assert said["mass by rigid motions"].startswith(f"{frame.mass:.6g} kg in all")
     assert said["centre of mass"] == "(7.5, 0, 0) m, among the nodes"
     assert float(said["rigid motions by the coordinates"].split()[0]) < 1e-10
+
+
+@pytest.mark.parametrize("exchanged", [False, True])
+def test_a_stiffness_that_moves_otherwise_than_its_nodes_is_doubted(
+    loose: Files, tmp_path: Path, exchanged: bool
+) -> None:
+    """Rotations about two axes exchanged, or nodes in mm: one number among others was all that told of it."""
+    held, name = {"1": "clamped"}, "freedoms.csv" if exchanged else "nodes.csv"
+    lines = (loose.folder / name).read_text(encoding="utf-8").splitlines()
+    other = {"rx": "ry", "ry": "rx"}
+    for n, line in enumerate(lines[1:], start=1):
+        node, *rest = line.split(",")
+        told = [other.get(way, way) for way in rest] if exchanged else [repr(1e3 * float(x)) for x in rest]
+        lines[n] = ",".join([node, *told])
+    (tmp_path / name).write_text("\n".join(lines), encoding="utf-8")
+    changes: dict[str, Any] = {name.partition(".")[0]: str(tmp_path / name)}
+    if not exchanged:
+        changes["track"] = {"from": [0.0, 0.0, 0.0], "to": [1e3 * LENGTH, 0.0, 0.0]}
+    (said,) = modal(loose.table(supports=held, **changes)).doubts
+    assert "length_unit" in said and "exchanged" in said and float(said.split()[0]) > 0.01
+    assert not modal(loose.table(supports=held)).doubts
+    assert "length_unit" in str(refusal(loose.table(**changes)))  # where nothing holds it
+    plan = make_plan(study(loose.table(supports=held, **changes), initial="rest"))
+    assert [f"bed: {said}"] == [text for text in remarks(plan) if text.startswith("bed: ")]
 
 
 @pytest.mark.parametrize(("kept", "ways", "centre"), [((0, 2, 4), "x, z", "0.4"), ((2, 4), "z", "unknown")])
