@@ -192,6 +192,7 @@ _MEANT = by_other_names(
     ("timed-move", "move-in-time move-time timed"),
     ("minimum-jerk", "min-jerk minjerk quintic polynomial"),
     ("cruise", "constant-speed constant linear uniform"),
+    ("standing", "stand stands rest rests resting fixed static stationary parked"),
     ("rigid", "mass rigid-body lump payload"),  # of a body; "mass" is a carriage
     ("waypoints", "cycloidal rest-to-rest"),
 )

@@ -24,6 +24,7 @@ MOTIONS = {
     "of least jerk": {"kind": "minimum-jerk", "start": 12.0, "end": 2.0, "time": 4.5, "dwell": 0.5},
     "a trapezoid, backward": STOPPING | {"start": 12.0, "end": 2.0},
     "too short for its speed": STOPPING | {"end": 2.5, "jerk": 20.0},
+    "standing": {"kind": "standing", "at": 4.0},
     "spline": {"kind": "waypoints", "times": [0, 2, 5], "positions": [3, 10, 4]},
 }
 

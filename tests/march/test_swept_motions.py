@@ -21,6 +21,7 @@ MOTIONS: dict[str, Table] = {
     },
     "timed-move": {"kind": "timed-move", "start": 0.1, "end": 0.9, "time": 3.0, "dwell": 1.0},
     "minimum-jerk": {"kind": "minimum-jerk", "start": 0.1, "end": 0.9, "time": 3.0, "dwell": 1.0},
+    "standing": {"kind": "standing", "at": 0.4, "time": 6.0},
     "waypoints": {"kind": "waypoints", "times": [0.0, 2.0, 4.0], "positions": [0.1, 0.8, 0.3]},
 }
 NUMBERS = [(kind, key) for kind, motion in MOTIONS.items() for key, value in motion.items() if isinstance(value, float)]
@@ -40,3 +41,19 @@ def test_swept_numbers_of_motions_do_what_they_do_alone(kind: str, key: str) -> 
         for end in ("max", "min", "rms"):
             np.testing.assert_allclose(swept[f"midspan_{end}"][number], alone[f"midspan_{end}"], rtol=1e-9)
     assert swept.midspan_rms[0] != swept.midspan_rms[1]
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_what_stands_stands_as_by_waypoints(first: bool) -> None:
+    """As the first carriage, whose time is that of the scene, and beside one that moves."""
+    found = []
+    for way in (
+        {"kind": "standing", "at": 0.3, "time": 5.0},
+        {"kind": "waypoints", "times": [0, 5], "positions": [0.3] * 2},
+    ):
+        pair = [("car", mass(0.2, way)), ("other", mass(0.1, cruise(0.0, 1.0, 0.25)))]
+        given = study(beam(), dict(pair if first else pair[::-1]), solver={"steps": 800, "fidelity": "full"})
+        found.append(engine.run(given))
+    for name in found[0].data_vars:
+        if found[0][name].dtype.kind == "f" and "contact" not in str(name):
+            np.testing.assert_allclose(found[0][name], found[1][name], rtol=1e-9, atol=1e-12)

@@ -14,6 +14,7 @@ from engine.scene.motions.base import Array, BetweenPlaces, Legs, Motion, Path, 
 from engine.scene.motions.minimum_jerk import MinimumJerk
 from engine.scene.motions.of_joints import AMPLITUDE, CONSTANT, PHASE, RATE, START, Number, blank, spline_pieces
 from engine.scene.motions.point_to_point import PointToPoint, TimedMove
+from engine.scene.motions.standing import Standing
 from engine.study_file.checks import Check, on_body
 from engine.study_file.spec import Hint, KindOf, Several, kinds
 from engine.study_file.units import Damping, Dimensionless, Force, Frequency, Length, Speed, Time, fault
@@ -321,7 +322,7 @@ class Sliding(Motion):
         return Path(np.full_like(tau, self.start), np.zeros_like(tau), np.zeros_like(tau))
 
 
-ALL = (Cruise, OutAndBack, Sinusoidal, Waypoints, PointToPoint, TimedMove, MinimumJerk, Sliding)
+ALL = (Cruise, OutAndBack, Sinusoidal, Waypoints, PointToPoint, TimedMove, MinimumJerk, Standing, Sliding)
 MOTIONS = kinds("motion", "wanderlast.motions", Motion, *ALL)
 AnyMotion = Annotated[Motion, KindOf("motion", MOTIONS)]
 

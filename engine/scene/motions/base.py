@@ -225,7 +225,8 @@ def both_places(number: Number) -> tuple[Array, Array]:
 
 def two_places(start: str, end: str) -> Check:
     """The condition that a stroke, by the keys of its ends, has a length."""
-    return Check(end, (start, end), lambda a, b: a != b, "start and end are the same place", "two places")
+    what, remedy = "start and end are the same place", 'kind = "standing" with `at` stays there'
+    return Check(end, (start, end), lambda a, b: a != b, what, "two places", remedy=remedy)
 
 
 @lru_cache(maxsize=256)
