@@ -22,6 +22,7 @@ MOST_PARTS = 8  # of a sweep that are told one by one
 MOST_APART = 3  # of them that are told each with what else is swept
 MOST_TOLD = 4  # values of another swept number that are told one by one
 GAP = 3.0  # times the usual distance of two values of a sweep
+SHARED = 50  # variants from which on a part of them is told too
 MOST_SHARES, FEWEST_SAMPLES = 6, 10  # values of a swept number that are told with the part of their variants
 NEARLY, CLOSE = 0.9, 0.99  # of a limit that is exceeded nowhere, or not beside: between swept values it may well be
 UNLIKE = 1e-4  # of a limit: what stays below is a limit in another unit, such as 3 for 3 um
@@ -202,7 +203,8 @@ def where(results: Results, beyond: Mask, axis: Axis | None) -> str:
     if axis is not None and VARIANT in results.dims and _has_samples(results, axis):
         return _in_parts(results, axis, beyond)
     if axis is None or axis.dim == VARIANT:
-        return f"in {counted(int(beyond.sum()), 'variant')} of {results.size:,}" if beyond.any() else "nowhere"
+        share = f" ({percent(float(beyond.mean()))})" if results.size >= SHARED else ""
+        return f"in {counted(int(beyond.sum()), 'variant')} of {results.size:,}{share}" if beyond.any() else "nowhere"
     others = [other for other in results.axes if other.name != axis.name]
     if len(others) != 1 or not 1 < others[0].values.size <= MOST_TOLD:
         return _along(results, axis, beyond)

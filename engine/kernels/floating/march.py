@@ -28,7 +28,16 @@ from engine.kernels.floating.layout import (
 )
 from engine.kernels.floating.motions import motions_at
 from engine.kernels.floating.newton import bound_masses, factor_masses, raise_beta, settle, solve_accelerations, step
-from engine.kernels.floating.observe import apart, count, count_between, observe, observe_whole, of_way
+from engine.kernels.floating.observe import (
+    apart,
+    at_stop,
+    compare,
+    count,
+    count_between,
+    observe,
+    observe_whole,
+    of_way,
+)
 from engine.kernels.floating.state import (
     CODE,
     EVENT,
@@ -65,14 +74,15 @@ OFF = 1e-9  # of a length: less over an end of a track is rounding of a given mo
 
 class Room(NamedTuple):
     """What the march of a block of lanes works in; signals (signals, LANES), past (2, K, LANES): those that are smooth,
-    at the two stations before, and left (T, LEFT, LANES): where tips come to rest, and how far from there they were
-    after a stop at the last station."""
+    at the two stations before, left (T, LEFT, LANES): where tips come to rest, and how far from there they were
+    after a stop at the last station, and errors (T, LANES): of their positions at the last station."""
 
     state: State
     solver: Solver
     signals: FloatArray
     past: FloatArray
     left: FloatArray
+    errors: FloatArray
 
 
 @called
@@ -201,8 +211,8 @@ def room_to_march(system, lane, record):
     two, both = np.zeros((2, N, N, LANES)), np.zeros((2, M, 3, LANES))
     memory, signals = np.zeros((MEMORY, LANES)), np.zeros((record.statistics.shape[1], LANES))
     solver = Solver(room(system, lane), np.zeros((N, LANES)), two[0], two[1], both[0], both[1], memory)
-    past, left = np.zeros((2, system.smooth.shape[0], LANES)), np.zeros((system.tips.shape[0], LEFT, LANES))
-    return Room(state, solver, signals, past, left)
+    past, tips = np.zeros((2, system.smooth.shape[0], LANES)), system.tips.shape[0]
+    return Room(state, solver, signals, past, np.zeros((tips, LEFT, LANES)), np.zeros((tips, LANES)))
 
 
 @called
@@ -281,7 +291,7 @@ def with_light_carriages(lane):
 @called
 def march_block(system, lane, scheme, steps, block, room, record):
     """One block of lanes from the start to the end, its signals and codes into the record."""
-    state, solver, signals, past, left = room
+    state, solver, signals, past, left, errors = room
     work, memory, kept = solver.work, solver.memory, 0
     start(system, lane, scheme, steps * lanes_at(lane.step, (0,)), state, solver, left)
     for number in range(steps + 1):
@@ -294,6 +304,9 @@ def march_block(system, lane, scheme, steps, block, room, record):
         watched = observe(system, lane, state.now, work, of(memory, TIME) + near_of(lane), signals)
         count(goes, signals, watched, number, 0.5 if number in (0, steps) else 1.0, record.statistics, block)
         count_between(goes, system.smooth, signals, past, number, record.statistics, block)
+        for t in range(errors.shape[0]):
+            stops, value, at = at_stop(system, lane, signals, errors, number, t)
+            compare(goes & stops, value, at, watched - errors.shape[0] + t, record.statistics, block)
         if system.bands.shape[1]:
             count_settling(system, lane, state.now, solver, left, number, record.settled[block])
         if kept < record.stations.size and record.stations[kept] == number:

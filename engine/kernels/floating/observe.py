@@ -319,14 +319,30 @@ def count(who, signals, watched, number, weight, statistics, block):
     at = all_lanes(float(number))
     for j in range(watched):
         value = lanes_at(signals, (j,))
-        larger = who & (value > lanes_at(statistics, (block, j, LARGEST)))
-        put_where(larger, statistics, (block, j, LARGEST), value)
-        put_where(larger, statistics, (block, j, LARGEST_AT), at)
-        smaller = who & (value < lanes_at(statistics, (block, j, SMALLEST)))
-        put_where(smaller, statistics, (block, j, SMALLEST), value)
-        put_where(smaller, statistics, (block, j, SMALLEST_AT), at)
+        compare(who, value, at, j, statistics, block)
         squares = lanes_at(statistics, (block, j, SQUARES))
         put_where(who, statistics, (block, j, SQUARES), squares + weight * value * value)
+
+
+@called
+def compare(who, value, at, j, statistics, block):
+    """A value of a signal, so many steps from the start, with its extremes."""
+    larger = who & (value > lanes_at(statistics, (block, j, LARGEST)))
+    put_where(larger, statistics, (block, j, LARGEST), value)
+    put_where(larger, statistics, (block, j, LARGEST_AT), at)
+    smaller = who & (value < lanes_at(statistics, (block, j, SMALLEST)))
+    put_where(smaller, statistics, (block, j, SMALLEST), value)
+    put_where(smaller, statistics, (block, j, SMALLEST_AT), at)
+
+
+@called
+def at_stop(system, lane, signals, before, number, t):
+    """Whether a tip's motions ended since the last station, its position error then, by a line between stations,
+    and how many steps from the start; before (T, LANES): the errors of the last station."""
+    one, two = lanes_at(before, (t,)), lanes_at(signals, (system.tips[t, TIP_SENSOR],))
+    put_lanes(before, (t,), two)
+    part = lanes_at(lane.stops, (t,)) / lanes_at(lane.step, (0,)) - (number - 1.0)
+    return (part > 0.0) & (part < 1.0), one + part * (two - one), part + (number - 1.0)
 
 
 @called

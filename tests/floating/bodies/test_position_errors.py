@@ -218,6 +218,20 @@ def test_after_the_stop_is_the_end_of_the_history(coarse: xr.Dataset) -> None:
     assert (coarse["tip_after_stop_max"] <= coarse["tip_max"]).all()
 
 
+def test_extremes_after_a_stop_begin_at_the_stop() -> None:
+    """Of an error that grows or falls from there on: they began at the first station behind it, a step off at most, of
+    which twice the steps with the same station told nothing."""
+    ends, steps = ("max", "min"), np.array([111, 215, 423, 839])  # 0.5 s is within a step of these and of twice as many
+    given = arm({"upper": LINK}, {"upper": {"joints": [MOVE]}}, sensor={"tip": reads("upper", 1.5)})
+    given = given.with_values({"question.duration": 0.52})
+    exact, *found = (studies.run(given.with_values({"solver.steps": int(n)})) for n in (26 * 400, *steps))
+    (first,) = (end for end in ends if float(exact[f"tip_after_stop_{end}_time"]) == pytest.approx(0.5, abs=1e-12))
+    name = f"tip_after_stop_{first}"
+    assert all(float(one[f"{name}_time"]) == pytest.approx(0.5, abs=1e-12) for one in found)
+    off = np.array([abs(float(one[name] - exact[name])) for one in found])
+    assert -np.polyfit(np.log(steps), np.log(off), 1)[0] == pytest.approx(2.0, abs=0.2)
+
+
 def test_the_answer_tells_how_far_the_tip_strays(coarse: xr.Dataset) -> None:
     said = KIND.findings(Results.of(coarse))
     whole, after = (next(i for i, one in enumerate(said) if word in one) for word in ("tip: the", "After the stop"))
