@@ -14,6 +14,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from engine.bodies.files.model import FileModel, load_model
+from engine.bodies.files.text import no_such_file
 from results_schema.errors import BadInput
 
 SECONDS = 120
@@ -68,7 +69,7 @@ def _state(path: str) -> State:
     try:
         found = os.stat(path)
     except (OSError, ValueError):
-        raise BadInput("no such file", where=path, expected="a file") from None
+        raise no_such_file(path) from None
     return found.st_mtime_ns, found.st_size, found.st_ino
 
 

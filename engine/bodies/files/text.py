@@ -35,12 +35,18 @@ class Line:
 Includes = Callable[[Line, Iterator[Line]], str | None]
 
 
+def no_such_file(path: str) -> BadInput:
+    """What is raised where a path leads to no file."""
+    remedy = "" if Path(path).is_absolute() else f"paths count from the working folder, which is {Path.cwd()}"
+    return BadInput("no such file", where=path, expected="a file", remedy=remedy)
+
+
 def file_bytes(path: str) -> bytes:
     """The bytes of a file. Raises BadInput where there is none, or it is empty or too large."""
     file = Path(path)
     try:
         if not file.is_file():
-            raise BadInput("no such file", where=path, expected="a file")
+            raise no_such_file(path)
         size = file.stat().st_size
         if size > MAX_BYTES:
             raise BadInput("the file is too large", where=path, expected=f"at most {MAX_BYTES} bytes")

@@ -117,6 +117,10 @@ def faults(folder: Path, files: Files) -> dict[str, tuple[dict[str, Any], list[s
         "few": ({"track": {"nodes": [1, 7, 2], "interpolation": "spline"}}, ["bed.track", "at least 4"]),
         "zero byte": ({"mass": "a\0b"}, ["bed.mass", "path"]),
         "folder": ({"mass": str(folder)}, ["bed.mass", "no such file"]),
+        "elsewhere": (
+            {"mass": "none.mtx"},
+            ["bed.mass: none.mtx: no such file", f"working folder, which is {Path.cwd()}"],
+        ),
     }
 
 
