@@ -28,8 +28,9 @@ NEARLY, CLOSE = 0.9, 0.99  # of a limit that is exceeded nowhere, or not beside:
 UNLIKE = 1e-4  # of a limit: what stays below is a limit in another unit, such as 3 for 3 um
 LIMIT = " Its absolute value exceeds "
 LIMITED = (
-    *("displacement", "rotation", "velocity", "acceleration", "bending_moment", "stress", "support_reaction"),
-    *("position_error", "drive_torque", "drive_force"),
+    *("displacement", "rotation", "velocity", "acceleration", "bending_moment", "shear_force", "axial_force", "stress"),
+    *("support_reaction", "support_moment", "contact_force", "suspension_force", "position_error"),
+    *("drive_torque", "drive_force"),
 )
 
 
@@ -41,8 +42,13 @@ class Limits(Spec):
     velocity: Annotated[Speed, Field(gt=0)] | None = None
     acceleration: Annotated[Acceleration, Field(gt=0)] | None = None
     bending_moment: Annotated[Torque, Field(gt=0)] | None = None
+    shear_force: Annotated[Force, Field(gt=0)] | None = None
+    axial_force: Annotated[Force, Field(gt=0)] | None = None
     stress: Annotated[Pressure, Field(gt=0)] | None = None
     support_reaction: Annotated[Force, Field(gt=0)] | None = None
+    support_moment: Annotated[Torque, Field(gt=0)] | None = None
+    contact_force: Annotated[Force, Field(gt=0)] | None = None
+    suspension_force: Annotated[Force, Field(gt=0)] | None = None
 
     def limit(self, name: str) -> float | None:
         """What is named for a quantity."""

@@ -89,6 +89,19 @@ def test_what_comes_near_its_limit_is_told_with_its_largest_value() -> None:
     assert "exceeds 20 m/s² nowhere from 1 to 8 m/s." in far
 
 
+@pytest.mark.parametrize(
+    ("quantity", "limit", "said"), [("contact_force", 1200.0, "1.2 kN"), ("suspension_force", 5.0, "5 N")]
+)
+def test_forces_of_carriages_have_limits_too(quantity: str, limit: float, said: str) -> None:
+    sensor = f'[sensor.pressed]\ncarriage = "cart"\nquantity = "{quantity}"'
+    question = f"{SENSORS}\n{sensor}\n[question]\n{quantity} = {limit}"
+    dataset = scenes.run("passage", scenes.pace("passage"), extra=question)
+    for end, value in (("max", 2.0 * limit), ("min", 0.0)):
+        dataset[f"pressed_{end}"].values[:] = [0.0, 0.0, value, 0.0]
+    first = answers.answer(dataset)[0]
+    assert first.startswith("pressed: ") and f"Its absolute value exceeds {said} at 5.67 m/s" in first
+
+
 def test_titles_name_the_largest_of_their_quantity() -> None:
     titles = {figure.name: figure.title for figure in answers.figures(passage())}
     assert titles["largest-displacement"].startswith("The largest displacement at 2.5 m of bed is 3 mm, at pace")
