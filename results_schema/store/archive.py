@@ -19,7 +19,7 @@ from results_schema.lazy_imports import xr
 from results_schema.status import Status, label
 from results_schema.store import files
 from results_schema.store.reading import SCHEMA_VERSION, checked, groups_of, read_small_tables, verify
-from results_schema.store.tables import CONTENTS, DIGEST, from_dataset, seal, to_dataset
+from results_schema.store.tables import CONTENTS, DIGEST, from_dataset, to_dataset
 from results_schema.store.writing import write_tables
 
 REQUIRED_ATTRIBUTES = ("Conventions", "title", "history", "schema_version", "study_kind", "study", "study_sha256")
@@ -90,7 +90,7 @@ def write_archive(
         raise ValueError(f"schema_version: expected {SCHEMA_VERSION}, received {root.attrs['schema_version']}")
     tables = {"/": from_dataset(root)}
     tables |= {"/" + name.strip("/"): from_dataset(dataset) for name, dataset in (groups or {}).items()}
-    files.write_whole(path, partial(write_tables, tables=tables, added=seal(tables)), look)
+    files.write_whole(path, partial(write_tables, tables=tables), look)
 
 
 def open_archive(path: Path | str) -> Archive:

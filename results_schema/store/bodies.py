@@ -12,7 +12,7 @@ from results_schema.arrays import Array
 from results_schema.errors import ArchiveError
 from results_schema.store import files
 from results_schema.store.reading import check_sizes, opened, read_tables
-from results_schema.store.tables import Column, Table, canonical, seal
+from results_schema.store.tables import Column, Table, canonical
 from results_schema.store.writing import write_tables
 
 BODY_VERSION = 1
@@ -106,7 +106,7 @@ def write_body(path: Path | str, body: StoredBody) -> None:
         columns[POINT_NAMES] = Column(("off_track",), np.array(body.points, dtype=object), {"long_name": "name"})
     attributes: dict[str, Any] = {key: canonical(float(body.numbers[key])) for key in NUMBERS}
     tables = {"/": Table(sizes, columns, attributes | {_VERSION: canonical(BODY_VERSION)})}
-    files.write_whole(path, partial(write_tables, tables=tables, added=seal(tables)))
+    files.write_whole(path, partial(write_tables, tables=tables))
 
 
 def read_numbers(path: Path | str) -> dict[str, float]:

@@ -23,7 +23,7 @@ from results_schema.store import files
 from results_schema.store.files import output_failed
 from results_schema.store.reading import opened, read_tables
 from results_schema.store.rows import VARIANTS, RowsOnDisk
-from results_schema.store.tables import CONTENTS, DIGEST, Table, seal
+from results_schema.store.tables import CONTENTS, DIGEST, Table
 from results_schema.store.writing import PLAIN, write_tables
 
 
@@ -149,7 +149,7 @@ class PartStore:
         root = part["/"]
         tables = {**part, "/": replace(root, attributes={**root.attributes, _KEY: self.key})}
         path = self._folder / (name + _SUFFIX)
-        files.write_whole(path, partial(write_tables, tables=tables, added=seal(tables), filters=PLAIN))
+        files.write_whole(path, partial(write_tables, tables=tables, filters=PLAIN))
         files.write_sidecar(path)
         return path
 

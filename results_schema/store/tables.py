@@ -174,10 +174,25 @@ def checksum(data: Numbers) -> str:
     """
     if data.dtype.kind == "O":
         return repr(data.tolist())
-    found, little = 0, data.dtype.newbyteorder("<")
+    found = Checksum(data.dtype)
     for part in slices(data.shape, data.dtype.itemsize) if data.shape else [...]:
-        found = zlib.crc32(np.ascontiguousarray(data[part], little).reshape(-1).view(np.uint8).data, found)
-    return f"{data.dtype.name} {found:08x}"
+        found.add(data[part])
+    return str(found)
+
+
+class Checksum:
+    """That of numbers of a type, which come part after part."""
+
+    def __init__(self, dtype: np.dtype[Any]) -> None:
+        self._dtype, self._found = dtype, 0
+
+    def add(self, part: Numbers) -> None:
+        """Take the numbers that come next."""
+        little = np.ascontiguousarray(part, self._dtype.newbyteorder("<"))
+        self._found = zlib.crc32(little.reshape(-1).view(np.uint8).data, self._found)
+
+    def __str__(self) -> str:
+        return f"{self._dtype.name} {self._found:08x}"
 
 
 def _attribute_texts(place: str, attributes: Mapping[str, Any]) -> Iterator[str]:

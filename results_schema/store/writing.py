@@ -11,7 +11,7 @@ import numpy as np
 
 from results_schema.blocks import CHUNK_BYTES, chunk_shape, slices
 from results_schema.store import files
-from results_schema.store.tables import Column, Table
+from results_schema.store.tables import Checksum, Column, Table, checksum, seal
 
 PLAIN: Mapping[str, Any] = {}  # of parts, which are read soon, and whose whole files have a SHA-256
 GUARDED: Mapping[str, Any] = {"fletcher32": True}
@@ -22,38 +22,41 @@ WORTH_PACKING = 0.3
 TRIED_BYTES = 2**17  # of the first chunk: to try all of it in 27 columns took as long as to write them
 
 
-def write_tables(
-    path: Path, tables: Mapping[str, Table], added: Mapping[str, Any], filters: Mapping[str, Any] = PACKED
-) -> None:
-    """Write tables by group ("/", "/model/bed") into a new file; `added` joins the root's attributes."""
+def write_tables(path: Path, tables: Mapping[str, Table], filters: Mapping[str, Any] = PACKED) -> None:
+    """Write tables by group ("/", "/model/bed") into a new file, and seal it."""
     import netCDF4
 
     with files.NETCDF_LOCK, netCDF4.Dataset(path, "w", format="NETCDF4") as dataset:
-        for group, table in tables.items():
-            place = dataset if group == "/" else dataset.createGroup(group)
-            _write_table(place, table, filters)
-        dataset.setncatts(dict(added))
+        written = {
+            group: _write_table(dataset if group == "/" else dataset.createGroup(group), table, filters)
+            for group, table in tables.items()
+        }
+        dataset.setncatts(seal(written))
 
 
-def _write_table(place: Any, table: Table, filters: Mapping[str, Any]) -> None:
+def _write_table(place: Any, table: Table, filters: Mapping[str, Any]) -> Table:
+    """The table, its columns with the checksums of what was written."""
     for name, size in table.sizes.items():
         place.createDimension(name, size)
     place.setncatts({key: _attribute(value) for key, value in table.attributes.items()})
     further = [name for name, column in table.columns.items() if column.is_coordinate and column.dims != (name,)]
-    named: set[str] = set()
+    named, sums = set[str](), dict[str, str]()
     for name, column in table.columns.items():
         # CF wants those coordinates named with a variable that lie over some of its dimensions.
         along = [one for one in further if set(table.columns[one].dims) <= set(column.dims)]
         beside = [] if column.is_coordinate else along
         named.update(beside)
         named_beside = {"coordinates": " ".join(beside)} if beside else {}
-        _write_column(place, name, replace(column, attributes={**column.attributes, **named_beside}), filters)
+        told = replace(column, attributes={**column.attributes, **named_beside})
+        sums[name] = _write_column(place, name, told, filters)
     rest = [name for name in further if name not in named]
     if rest:
         place.setncattr("coordinates", " ".join(rest))
+    return replace(table, columns={name: replace(one, checksum=sums[name]) for name, one in table.columns.items()})
 
 
-def _write_column(place: Any, name: str, column: Column, filters: Mapping[str, Any]) -> None:
+def _write_column(place: Any, name: str, column: Column, filters: Mapping[str, Any]) -> str:
+    """The checksum of what was written: data on the disk are read once."""
     options: dict[str, Any] = {"fill_value": False}
     if column.data.dtype.kind == "f" and not column.is_coordinate:
         options["fill_value"] = column.data.dtype.type(np.nan)
@@ -69,9 +72,13 @@ def _write_column(place: Any, name: str, column: Column, filters: Mapping[str, A
     variable.setncatts({key: _attribute(value) for key, value in column.attributes.items() if key != "_FillValue"})
     if not column.is_chunked:
         variable[...] = column.data if column.dims else column.data.item()
-        return
+        return checksum(column.data)
+    found = Checksum(column.data.dtype)
     for part in slices(column.data.shape, column.data.dtype.itemsize):
-        variable[part] = np.asarray(column.data[part])
+        numbers = np.asarray(column.data[part])
+        variable[part] = numbers
+        found.add(numbers)
+    return str(found)
 
 
 def _shrinks(data: Any, shape: tuple[int, ...]) -> bool:

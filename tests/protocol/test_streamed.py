@@ -16,7 +16,7 @@ from results_schema.errors import ArchiveError, BadInput
 from results_schema.store import arrays_on_disk, files, parts, reading, rows, tables
 from results_schema.store.archive import open_archive
 from results_schema.store.rows import Rows, RowsOnDisk
-from results_schema.store.tables import Column, Table, seal
+from results_schema.store.tables import Column, Table
 from results_schema.store.writing import write_tables
 from studies.commands.cli import main as command
 from studies.protocol.parts import Variants
@@ -164,7 +164,7 @@ def test_blocks_give_the_bytes_of_the_whole(
     written = []
     for size in (2**24, BLOCK, 1):
         monkeypatch.setattr(blocks, "BLOCK_BYTES", size)
-        write_tables(tmp_path / "a.nc", table, seal(table))
+        write_tables(tmp_path / "a.nc", table)
         written.append((tmp_path / "a.nc").read_bytes())
     assert written[0] == written[1] == written[2]
 
@@ -246,7 +246,7 @@ def test_memory_holds_a_few_arrays_alone(tmp_path: Path, monkeypatch: pytest.Mon
             found.add(Rows(variants, {name: variants.astype(float) for name in names}))
         columns = {name: tables.xr.Variable(("variant",), found.array(name, (count,))) for name in names}
         root = tables.from_dataset(tables.xr.Dataset(columns, attrs={"schema_version": 2, "study_kind": "passage"}))
-        write_tables(tmp_path / "a.nc", {"/": root}, seal({"/": root}))
+        write_tables(tmp_path / "a.nc", {"/": root})
     with reading.opened(tmp_path / "a.nc") as dataset:
         read = tables.to_dataset(reading.read_small_tables(tmp_path / "a.nc", dataset)["/"])
     for name in names:
