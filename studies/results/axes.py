@@ -58,8 +58,8 @@ class Axis:
 
     @property
     def noun(self) -> str:
-        """Its name as a word."""
-        return self.name.replace("_", " ")
+        """Its name as a word; of the key of a place one that stands behind "at"."""
+        return "place" if self.name == "at" else self.name.replace("_", " ")
 
     @property
     def title(self) -> str:

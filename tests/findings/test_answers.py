@@ -365,3 +365,10 @@ def test_lift_off_is_told_over_the_critical_speed_on_one_span_alone(middle: floa
     (said,) = [one for one in studies.answer(studies.run(engine.load(text))) if "would lift off" in one]
     assert "first at 10 m/s" in said
     assert ("of the critical speed" in said) is told
+
+
+def test_a_swept_place_is_told_as_one() -> None:
+    """A sweep that is called `at` after its key read "largest at at 2 m"."""
+    sweep = 'at = { of = "sensor.midspan.at", values = [4.0, 5.0] }'
+    text = "\n".join(answers.answer(scenes.run("passage", sweep)))
+    assert "at place 5 m" in text and "at at" not in text
