@@ -15,6 +15,7 @@ from results_schema.errors import BadInput
 from studies.moving.ways import refuse_ways
 from studies.protocol.converged import HISTORY, Told, labelled
 from studies.protocol.parts import Piece, Took, Work, unlabelled
+from studies.results.formatting import counted
 from studies.results.places import spread
 
 if TYPE_CHECKING:
@@ -82,7 +83,7 @@ def pieces(study: Study, duration: Callable[[Mapping[str, Array], int], Array]) 
         size = int(np.clip(2 * PIECE_SECONDS / each, 1, 4096))
         for first in range(0, scene.variants.size, size):
             own = scene.variants[first : first + size]
-            words = f"{own.size:,} variants over {longest:.4g} s"
+            words = f"{counted(own.size, 'variant')} over {longest:.4g} s"
             compute = partial(_march, scene, cases, own, duration, longest)
             found.append(Piece(f"variants-{len(found):04d}", words, compute, 0.5 * each * own.size + 0.5))
     return found

@@ -122,7 +122,7 @@ class Variants:
         self.kind = kind
         self.plan = make_plan(study, reduction=kind.reduction(study), results=kind.name)
         check_limits(self.plan)
-        self.words = f"the parts and the archive of {self.plan.size} variants"
+        self.words = f"the parts and the archive of {counted(self.plan.size, 'variant')}"
         # The parts, the archive, and results on their way from these to that where they do not fit into memory.
         self.disk_bytes = 2 * self.plan.disk_bytes + (self.plan.disk_bytes - self.plan.gathered_bytes)
         self.remarks = tuple(remarks(self.plan))
