@@ -31,8 +31,8 @@ from results_schema.arrays import Array, Counts
 #: for the hardest passage of accuracy.md; undamped loads that step on free ends needed a hundred times that at 1e-4.
 MOST_WORK = 3e7
 #: Where a study fixes steps: times its own that levels take at most, so that a sixteenth of what these are off by is
-#: left; and of the work of their first modes. With a million steps whose values were right to 1e-12 estimated errors
-#: were 3e-2 where every level took twice the steps, up to the work above.
+#: left; and times their first level's work, which lets the modes double twice with these. Where every level took twice
+#: the steps, up to the work above, a million steps that were right to 1e-12 were told to be off by 3e-2.
 MOST_OF_FIXED, MOST_WORK_OF_FIXED = 4.0, 16.0
 FIRST_PERIODS = 20  # steps per first period of schemes without a limit at level 0: 8e-3 of phase at most
 #: The same up to which no mode takes mass (four of a beam need 50 to 110): where loads step onto a free end, with 20 to

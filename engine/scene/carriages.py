@@ -136,11 +136,11 @@ class Carriage(SpecOfKind):
     def level_contacts(self) -> list[list[str]]:
         """Names of those contacts that stand one behind the other on a body but at one place of the own track, about
         which nothing turns."""
-        found: dict[tuple[float | None, str], list[str]] = {}
+        found: dict[tuple[float, str], list[str]] = {}
         for (name, contact), on in zip(self.riding_contacts.items(), self.ridden, strict=False):
-            if contact.offset is not None:
+            if contact.at is not None and contact.offset is not None:
                 found.setdefault((contact.at, on), []).append(name)
-        return [names for (at, _), names in found.items() if at is not None and len(names) > 1]
+        return [names for names in found.values() if len(names) > 1]
 
     def reference_on(self, track: float) -> float:
         """m, the place of the riding body's own track, of a length (m), that the motion moves."""

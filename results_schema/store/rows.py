@@ -259,7 +259,7 @@ def _stacked(arrays: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def _table(rows: Rows) -> Table:
-    """Rows as a table: arrays of a type and shape in one column, as a column costs a file as much as some ten thousand
+    """Rows as a table: arrays of a type and shape in one column. One more column takes as long as some thirty thousand
     numbers, and a train of 24 axles has 200 results."""
     variants = np.ascontiguousarray(rows.variants, np.int64)
     if variants.ndim != 1 or variants.size == 0 or variants.min() < 0:

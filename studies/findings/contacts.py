@@ -20,8 +20,8 @@ from studies.results.results import Results
 MOST_GROUPS = 5
 BEYOND = "The equations assume contact: beyond, they say no more."
 LEVEL = (
-    "may only seem to: its contacts at one place of its track stay level, as nothing there turns, and bear what the "
-    "track under them bends by; a frame with a point at each of them pitches."
+    "may only seem to: contacts at one place of a track that lies across stay level, as nothing there turns, and bear "
+    "what the track under them bends by; a frame with a point at each of them pitches."
 )
 #: Sensors read contact forces to the very end; smallest ones are of that span where they converge with the modes.
 ASIDE = ", the last 2 % before a held end aside"

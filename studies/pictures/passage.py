@@ -41,6 +41,7 @@ from studies.results.results import Results
 
 MOST_HISTORIES = 4
 CURVES = (".mass", *DAMPING, ".force")  # by what they tell: a force multiplies all that it does by the same factor
+FLAT = 0.1  # a map of ratios that vary less shows nothing
 DOTTED, SAME = re.compile(r"Dotted: .*?\.(?= |$)"), "Dotted: the speeds of the figure before."
 
 
@@ -55,7 +56,6 @@ class _Below(NamedTuple):
 
 RESTING = _Below("contact", "would lift off", "the carriage would lift off", "contact opens")
 GUIDED = _Below("contact-guided", "is held down by its guide", "the guide of the carriage pulls", "its guide pulls")
-FLAT = 0.1  # a map of ratios that vary less shows nothing
 
 
 def pictures(results: Results) -> list[Figure]:

@@ -101,8 +101,8 @@ def load_model(path: Path) -> FileModel:
 
 
 def checked(model: FileModel, where: str, own: Mapping[str, str] = MappingProxyType({})) -> FileModel:
-    """The model with exactly symmetric matrices; where: the file of the matrices, but of those that have one of their
-    ``own``. Raises BadInput naming the node."""
+    """The model with exactly symmetric matrices; where: its file; own: files of single matrices by their names. Raises
+    BadInput naming the node."""
     if not len(model.nodes):
         raise BadInput("there is no node", where=where)
     _check_nodes(model, where)

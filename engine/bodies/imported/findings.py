@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 FITS = 1e-6  # of the stiffness: less resists rigid motions by rounding
-DOUBTFUL = 1e-3  # of the stiffness: files with six digits of coordinates leave 1e-5
+DOUBTFUL = 1e-3  # of the stiffness: matrices of six, four and three digits leave 1e-7, 1e-4 and 4e-3
 SAME_MASS = 1e-6  # relative difference of the mass in three directions that is still one mass
 SHEAR = 0.02  # relative difference of rotations and slopes beyond which the spline is worth a thought
 
