@@ -285,9 +285,8 @@ def _light(plan: Plan) -> Iterator[str]:
     for body, part in enumerate(plan.base.bodies):
         loads = {number: tie.name for number, tie in enumerate(plan.base.carriages) if tie.body == body}
         share, load = max(_pressing(grid, body, loads) for grid in plan.grids)
-        if 0.0 < share < LIGHT and not any(
-            _weighs_with_unit(study, name) or _is_loaded(study, name) for name in loads.values()
-        ):
+        matter = (_weighs_with_unit(study, name) or _excites(study, name) for name in loads.values())
+        if 0.0 < share < LIGHT and not any(matter):
             names = dict.fromkeys(study.source.written(f"carriage.{name}").replace(".", " ") for name in loads.values())
             masses = any(study.carriage[name].reacts for name in loads.values())
             press = "loads of {} together press" if len(loads) > 1 else "load of {} presses"
@@ -298,9 +297,10 @@ def _light(plan: Plan) -> Iterator[str]:
             )
 
 
-def _is_loaded(study: Study, name: str) -> bool:
-    """Whether further carriages go along the body that rides as one."""
-    return any(other.on == study.carriage[name].riding_body for other in study.carriage.values())
+def _excites(study: Study, name: str) -> bool:
+    """Whether it is not by its weight alone that a carriage matters: it pulsates, or others go along what it is."""
+    own = study.carriage[name]
+    return own.pulsates or any(other.on == own.riding_body for other in study.carriage.values())
 
 
 def _pressing(grid: SceneGrid, body: int, carriages: Iterable[int]) -> tuple[float, float]:

@@ -105,12 +105,11 @@ class NewmarkScheme:
         return np.asarray(slower**2 * (1.0 / (6.0 * (1.0 + root)) + root * (1.0 - slower) / self.scaled_from**2))
 
     def velocity_part(self, x: FloatArray) -> FloatArray:
-        """Velocity over that of a mode of omega h = x which swings freely:  s (1 - y^2/6)^1/2  of Fox-Goodwin's, s and
-        y as of `velocity_at_kinks`."""
-        if math.isinf(self.scaled_from):
-            return np.ones_like(x)
+        """Velocity over that of a mode of omega h = x which swings freely:  s (1 + (beta - 1/4) y^2)^1/2  with
+        gamma = 1/2, s and y as of `velocity_at_kinks`."""
         y = np.minimum(x, self.scaled_from)
-        return np.asarray(np.where(x > y, y / np.maximum(x, 1.0), 1.0) * np.sqrt(1.0 - y**2 / 6.0))
+        root = np.sqrt(np.maximum(1.0 + (self.beta - 0.25) * y**2, 0.0))  # beyond the limit nothing swings
+        return np.asarray(np.where(x > y, y / np.maximum(x, 1.0), 1.0) * root)
 
     @property
     def stability_limit(self) -> float:

@@ -39,6 +39,8 @@ def initial_state(model: SceneModel, lanes: LaneTable) -> State:
         q += found[:, count, None] * lanes.gravity[:, None]
     if model.has_constant:
         q[:, -1] = 1.0
+    if model.pulsating:
+        q[:, model.pulses], v[:, model.pulses] = np.sin(lanes.phase), np.cos(lanes.phase) * lanes.omega[:, model.pulses]
     _meet(model, lanes, along, (q, v))
     return State(q, v, np.zeros(shape), np.zeros(shape))
 

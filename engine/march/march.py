@@ -97,7 +97,10 @@ class March:
     def start(self, segment: Segment, table: SegmentTable, observed: Observed, before: Segment | None) -> None:
         """The impulse and the new accelerations of a segment's event, and its first station, seen with all modes' own
         masses."""
-        model, stepped, swinging = self.tables.model, self.stepped(segment, table), self.state.v.copy()
+        model, stepped = self.tables.model, self.stepped(segment, table)
+        if before is None and model.pulsating:
+            self.state.v[:, model.pulses] *= self._velocity_part(segment)[:, model.pulses]
+        swinging = self.state.v.copy()
         if self.unseen(segment, before):
             whole = self.lanes.steps_of(self.step_size(segment), table.numbers)
             if segment.strikes:
@@ -119,12 +122,14 @@ class March:
         are, and about what the loads push on."""
         model, struck = self.tables.model, self.state.v - swinging
         if before is not None:
-            turned = [model.omega[:, None] * self.step_size(one)[:, None] for one in (before, segment)]
-            was, becomes = (model.scheme.velocity_part(part) for part in turned)
-            kept = becomes / was
+            kept = self._velocity_part(segment) / self._velocity_part(before)
             kept[:, model.residuals] = 1.0
             swinging = (swinging - self._beyond_derivatives(before, self.ending)) * kept
         self.state.v[...] = swinging + struck + self._beyond_derivatives(segment, table.rates[0])
+
+    def _velocity_part(self, segment: Segment) -> Array:
+        """(blocks, N, LANES) velocities of the scheme over those of what swings freely."""
+        return np.asarray(self.tables.model.scheme.velocity_part(self.lanes.turned(self.step_size(segment))))
 
     def _beyond_derivatives(self, segment: Segment, rates: Array) -> Array:
         """(blocks, N, LANES) what velocities of the scheme are beyond derivatives by rates of `force_rates`."""

@@ -311,7 +311,7 @@ def _largest_static(force: Array, offset: Array, loads: Array, gravity: Array) -
 
 def _scale(tables: SceneTables, values: VariantValues, numbers: Flat) -> Array:
     """(V, J) the largest static value of every sensor; its own largest where that is none, as of a rate, or where
-    something pushes its body along its track, at which statics do not look, and no less than statics that are rounding;
+    something pushes its body that statics do not look at, and no less than statics that are rounding;
     infinite where nothing is but rounding."""
     columns, least = [], _least_static(tables, values)
     count = len(tables.model.study.sensor)
@@ -319,7 +319,7 @@ def _scale(tables: SceneTables, values: VariantValues, numbers: Flat) -> Array:
         static = np.asarray(numbers[f"{sensor.name}_static"], dtype=np.float64)
         own = np.maximum(*(np.abs(np.asarray(numbers[f"{sensor.name}_{end}"])) for end in ("max", "min")))
         if not sensor.offset_order:
-            pushed = "along" in tables.model.pushed(sensor.body)
+            pushed = tables.model.exceeds_statics(sensor.body)
             own = np.maximum(least[:, j], np.where(pushed | (static == 0.0), np.maximum(static, own), static))
         columns.append(own)
     found = np.stack(columns, axis=1) if columns else np.zeros((values.size, 0))

@@ -46,10 +46,21 @@ def least_steps(model: SceneModel, values: VariantValues) -> Array:
     scale = values.scene_time_scale
     found = np.asarray(LIMIT_MARGIN * float(model.omega.max()) * scale / model.scheme.stability_limit)
     found = np.maximum(found, LEAST_MARGIN * _alias(model, scale))
+    found = np.maximum(found, LIMIT_MARGIN * pulsation_steps(model, values))
     if model.springs:
         found = np.maximum(found, model.scheme.stride * contact_omega(model, values) * scale / (2.0 * np.pi))
         found = np.maximum(found, limit_with_springs(model, values))
     return found
+
+
+def pulsation_steps(model: SceneModel, values: VariantValues) -> Array:
+    """(V,) steps of which two make a period of the fastest pulsating force, and with which it is within the limit of
+    the scheme, and its coordinate takes no mass; 0 without any."""
+    fastest = np.zeros(values.size)
+    for number in model.pulsating:
+        fastest = np.maximum(fastest, values.pulsation(model.carriages[number].name)[1])
+    limit = min(math.pi, model.scheme.oscillator_limit, model.scheme.scaled_from)
+    return np.asarray(model.scheme.stride * fastest * values.scene_time_scale / limit)
 
 
 def _alias(model: SceneModel, scale: Array) -> Array:
@@ -224,6 +235,9 @@ def check_steps(model: SceneModel, values: VariantValues, steps: Counts) -> None
     _check_limit(model, time_scale, steps)
     if not is_damped(model.scheme):
         _check_alias(model, time_scale, steps)
+    if model.pulsating:
+        least = pulsation_steps(model, values)
+        _refuse(model, least, steps, "a step is longer than half a period of a pulsating force")
     if not model.springs:
         return
     check_free_vibration(model, values)

@@ -235,6 +235,9 @@ def check_comparison(scheme: ComparisonScheme, model: SceneModel) -> None:
             received=f"{len(model.carriages)} carriages, {len(model.dampers)} dampers, {len(model.springs)} springs",
         )
     carriage = model.carriages[0]
+    if carriage.pulsates:
+        what, where = f"{scheme.name} is for comparison only", f"carriage.{carriage.name}.pulsation"
+        raise model.study.source.fault(where, what, expected="a force that stays the same")
     if isinstance(scheme.rule, RigidTie) and (carriage.inertia != "mass" or model.bodies[carriage.body].own_weight):
         what = f"{scheme.name} is for comparison only"
         expected = "a mass in full on a body whose own weight does not act"

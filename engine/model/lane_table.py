@@ -67,11 +67,13 @@ def from_blocks(blocks: Array, size: int) -> Array:
 class LaneTable:
     """Numbers of whole blocks of variants of one scene, in SI units.
 
-    omega (N,);  rates (blocks, N, LANES): 2 zeta omega;  inverse_modal_mass (blocks, N, LANES): 1, and 1/m (1/kg) of
-    sprung masses;  mass, weight (blocks, ties, LANES): of the carriages, zero for dampers and springs, mass only what
-    touches the body and has inertia;  joint (blocks, ties, LANES): 1 for rigid joints;  damper, spring (blocks, ties,
-    LANES): N s/m and N/m, zero for carriages;  of_carriages (blocks, carriages, LANES): N, their weights alone;
-    time_scale, gravity (blocks, LANES).
+    omega (N, 1), or (blocks, N, LANES) where forces pulsate;  rates (blocks, N, LANES): 2 zeta omega;
+    inverse_modal_mass (blocks, N, LANES): 1, 1/m (1/kg) of sprung masses, and 0 of what nothing moves;  mass, weight
+    (blocks, ties, LANES): of the carriages, zero for dampers and springs, mass only what touches the body and has
+    inertia;  joint (blocks, ties, LANES): 1 for rigid joints;  damper, spring (blocks, ties, LANES): N s/m and N/m,
+    zero for carriages;  pulse (blocks, ties, LANES): N, amplitudes of forces that pulsate;  phase (blocks, these
+    forces, LANES): rad;  of_carriages (blocks, carriages, LANES): N, their weights alone;  time_scale, gravity
+    (blocks, LANES).
     """
 
     omega: Array
@@ -82,15 +84,21 @@ class LaneTable:
     weight: Array
     damper: Array
     spring: Array
+    pulse: Array
+    phase: Array
     of_carriages: Array
     time_scale: Array
     gravity: Array
+
+    def turned(self, step: Array) -> Array:
+        """(blocks, N, LANES) omega h of all coordinates for a step (blocks, LANES) in s."""
+        return np.asarray(self.omega * step[:, None])
 
     def steps_of(self, step: Array, ties: Counts | None = None, scaled_from: float = math.inf) -> Lanes:
         """The kernels' lanes for a step h (blocks, LANES) in s; ties: numbers of some, where not of all; scaled_from:
         omega h from which modes take more mass, their stiffness and damping the same."""
         h = step[:, None, :]
-        turned = self.omega[:, None] * h
+        turned = self.turned(step)
         limited = not math.isinf(scaled_from)
         slower = np.minimum(1.0, scaled_from / np.maximum(turned, np.finfo(np.float64).tiny)) if limited else 1.0
         own = np.arange(self.mass.shape[1]) if ties is None else ties
@@ -98,7 +106,9 @@ class LaneTable:
             stiffness=(turned * slower) ** 2,
             damping=self.rates * h * slower**2,
             inverse_modal_mass=self.inverse_modal_mass * slower**2,
-            coupling_mass=(self.mass + self.joint).take(own, 1) + self.damper.take(own, 1) * h,
+            coupling_mass=(self.mass + self.joint).take(own, 1)
+            + self.damper.take(own, 1) * h
+            - self.pulse.take(own, 1) * h**2,
             coupling_stiffness=self.spring.take(own, 1) * h**2,
             load=self.weight.take(own, 1) * h**2,
             weight=self.of_carriages,
@@ -118,25 +128,56 @@ def lane_table(model: SceneModel, values: VariantValues) -> LaneTable:
     coefficients += [values.column(spring.keys.damping) for spring in model.springs]
     pushes, alongside = [none] * len(model.pushes), [moving_mass(model, values, p.carriage) for p in model.pushes]
     stiffness = [none if spring.rigid else values.column(spring.keys.stiffness) for spring in model.springs]
-    sprung = [1.0 / values.column(s.keys.mass)[None] for s in model.sprung]
-    added = model.omega.size - model.body_modes - len(sprung)
     residual = [rates[model.attachments[r][0].body][-1:] + _more_damping(model, r) for r in model.corrected]
     damped = np.concatenate([*rates, np.zeros((len(model.sprung), values.size)), *residual])
     return LaneTable(
-        omega=model.omega,
+        omega=_frequencies(model, values),
         rates=to_blocks(np.pad(damped, ((0, model.omega.size - len(damped)), (0, 0)))),
-        inverse_modal_mass=to_blocks(
-            np.concatenate([np.ones((model.body_modes, values.size)), *sprung, np.ones((added, values.size))])
-        ),
+        inverse_modal_mass=to_blocks(_inverse_modal_mass(model, values)),
         mass=to_blocks(np.stack(masses + dampers + springs + alongside)),
         joint=to_blocks(np.stack(carriages + dampers + rigid + pushes)),
         weight=to_blocks(np.stack([*heavy, *dampers, *springs, *pushes])),
         damper=to_blocks(np.stack(carriages + coefficients + pushes)),
         spring=to_blocks(np.stack(carriages + dampers + stiffness + pushes)),
+        pulse=to_blocks(_pulses(model, values)),
+        phase=_phases(model, values),
         of_carriages=to_blocks(heavy),
         time_scale=to_blocks(values.scene_time_scale),
         gravity=to_blocks(values.gravity),
     )
+
+
+def _frequencies(model: SceneModel, values: VariantValues) -> Array:
+    """(N, 1) rad/s of all coordinates, or (blocks, N, LANES) with those of the forces that pulsate."""
+    if not model.pulsating:
+        return model.omega[:, None]
+    found = np.repeat(model.omega[:, None], values.size, axis=1)
+    found[model.pulses] = [values.pulsation(model.carriages[number].name)[1] for number in model.pulsating]
+    return to_blocks(found)
+
+
+def _inverse_modal_mass(model: SceneModel, values: VariantValues) -> Array:
+    """(N, V) 1, 1/m of sprung masses, and 0 of forces that pulsate: nothing moves their coordinates."""
+    found = np.ones((model.omega.size, values.size))
+    for spring in model.sprung:
+        found[spring.mode] = 1.0 / values.column(spring.keys.mass)
+    found[model.pulses] = 0.0
+    return found
+
+
+def _pulses(model: SceneModel, values: VariantValues) -> Array:
+    """(ties, V) N, the amplitudes of the forces that pulsate."""
+    found = np.zeros((model.ties, values.size))
+    for number in model.pulsating:
+        found[number] = values.pulsation(model.carriages[number].name)[0]
+    return found
+
+
+def _phases(model: SceneModel, values: VariantValues) -> Array:
+    """(blocks, P, LANES) rad of the forces that pulsate."""
+    if not model.pulsating:
+        return np.zeros((values.size // LANES, 0, LANES))
+    return to_blocks(np.stack([values.pulsation(model.carriages[number].name)[2] for number in model.pulsating]))
 
 
 def _more_damping(model: SceneModel, tie: int) -> float:

@@ -18,7 +18,7 @@ from engine.model.refusals import check_rigid_modes
 from engine.model.rider import Rider
 from engine.model.support_reactions import Place, stand
 from engine.model.ties import CarriageTie, DamperTie, Load, PushTie, SpringTie
-from engine.scene.variants import SpringKeys, keys_of_carriage
+from engine.scene.variants import SpringKeys, in_use, keys_of_carriage
 from results_schema.arrays import Array, Counts, Mask
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity
@@ -80,12 +80,12 @@ class SceneModel:
     @cached_property
     def omega(self) -> Array:
         """(N,) natural frequencies of all bodies, rad/s, 0 for every sprung mass, those of residual coordinates, which
-        are the highest kept and ask for no smaller steps, and 0 for the coordinate that stays 1, which is there where
-        something pushes along its track."""
-        sprung, constant = np.zeros(len(self.sprung)), np.zeros(int(self.has_constant))
+        are the highest kept and ask for no smaller steps, 0 for pulsating forces, whose frequency is the variant's, and
+        0 for the coordinate that stays 1, which is there where something pushes along its track."""
+        sprung, others = np.zeros(len(self.sprung)), np.zeros(len(self.pulsating) + self.has_constant)
         bodies = (part.modal.omega for part in self.bodies)
         residual = [self.bodies[body].modal.omega[-1] for body in self.corrected_bodies]
-        return np.concatenate([*bodies, sprung, residual, constant])
+        return np.concatenate([*bodies, sprung, residual, others])
 
     @property
     def has_constant(self) -> bool:
@@ -111,6 +111,16 @@ class SceneModel:
         """The residual coordinates among all coordinates."""
         first = self.body_modes + len(self.sprung)
         return slice(first, first + self.corrected.size)
+
+    @property
+    def pulsating(self) -> list[int]:
+        """Numbers of the carriages whose force pulsates."""
+        return [number for number, carriage in enumerate(self.carriages) if carriage.pulsates]
+
+    @property
+    def pulses(self) -> slice:
+        """Their coordinates among all: oscillators that nothing holds back, z'' + Omega^2 z = 0, of amplitude 1."""
+        return slice(self.residuals.stop, self.residuals.stop + len(self.pulsating))
 
     @property
     def sprung(self) -> tuple[SpringTie, ...]:
@@ -203,6 +213,10 @@ class SceneModel:
         """Directions beside that of loads in which the inertia of carriages acts on the track of a body."""
         return {push.direction for push in self.pushes if push.body == body}
 
+    def exceeds_statics(self, body: int) -> bool:
+        """Whether something pushes a body that statics do not count: inertia along its track, or a pulsating force."""
+        return "along" in self.pushed(body) or any(self.carriages[n].body == body for n in self.pulsating)
+
     def springs_of(self, carriage: int) -> dict[int, SpringTie]:
         """The springs of a carriage by their number among all ties."""
         numbered = enumerate(self.springs, start=self.first_spring)
@@ -258,7 +272,7 @@ def build_model(
     not given. Raises BadInput where the scene cannot be marched.
     """
     numerics = Numerics.of(study) if numerics is None else numerics
-    used = [name for name in study.body if _in_use(study, name)]
+    used = [name for name in study.body if in_use(study, name)]
     parts: list[BodyPart] = []
     first = 0
     for name in used:
@@ -269,9 +283,8 @@ def build_model(
     for number, (name, carriage) in enumerate(study.carriage.items()):
         body = used.index(carriage.on)
         rider = Rider(carriage.motion, parts[body].modal.length, paces.get(name, 1.0), delays.get(name, 0.0))
-        carriages.append(
-            CarriageTie(name, body, rider, _inertia(study, numerics, name, swept), (Load(number, 1.0, body),))
-        )
+        own = _inertia(study, numerics, name, swept), (Load(number, 1.0, body),)
+        carriages.append(CarriageTie(name, body, rider, *own, pulsates=carriage.pulsates))
     dampers = [
         DamperTie(number, at, key)
         for number, name in enumerate(used)
@@ -309,18 +322,6 @@ def with_numerics(model: SceneModel, numerics: Numerics) -> SceneModel:
     if numerics == model.numerics:
         return model
     return build_model(model.study, *model.timing, model.swept, numerics)
-
-
-def _in_use(study: Study, body: str) -> bool:
-    """Whether a body carries a carriage, a robot, a sensor, an envelope, a load or a spring, or its frame moves or
-    holds another one."""
-    moving = [name for carriage in study.carriage.values() for name in carriage.bodies]
-    moving += [name for robot in study.robot.values() for name in robot.rails]
-    moving += [*study.frame, *(frame.on for frame in study.frame.values())]
-    moving += [load.on for load in study.load.values()]
-    moving += [end.on for spring in study.spring.values() for end in spring.ends]
-    read = (*(study.body_of(sensor) for sensor in study.sensor), *(e.body for e in study.envelope.values()))
-    return body in (*moving, *read)
 
 
 def _inertia(study: Study, numerics: Numerics, name: str, swept: Collection[str]) -> Inertia:

@@ -57,6 +57,7 @@ class CarriageTie:
 
     loads: what carries its weight on level ground: itself but for a body on its contacts.
     rides: number of the body that rides, with its mass (kg) and the place of its own track that the motion moves (m).
+    pulsates: whether its force swings in time.
     """
 
     name: str
@@ -67,6 +68,7 @@ class CarriageTie:
     rides: int | None = None
     own_mass: float = 0.0
     reference: float = 0.0
+    pulsates: bool = False
 
     @property
     def attachments(self) -> tuple[Attachment, ...]:

@@ -97,6 +97,8 @@ def tie_rows(model: SceneModel, along: Along, ties: Counts, missed: Array | None
             if along[spring.rider].active:
                 under = _sag_under(model, spring, model.attachments[r][0], along)
                 drive[:, place], level[:, place] = np.where(along[spring.rider].on, under, 0.0)
+        elif r in model.pulsating:
+            rows[:, model.pulses.start + model.pulsating.index(r), place, CURVE] = along[r].on
         elif r < len(model.carriages) and along[r].active and model.carriages[r].inertia == "mass":
             drive[:, place] = _curved_sag(model, model.carriages[r].attachments[0], along)
     if np.isin(ties, model.corrected).any():
@@ -143,7 +145,7 @@ def _kinds(model: SceneModel) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDA
     inertial = [carriage.inertia != "force" for carriage in model.carriages]
     inertial += [False for _ in model.dampers] + [spring.rigid for spring in model.springs]
     inertial += [True for _ in model.pushes]
-    damped = [False for _ in model.carriages] + [True for _ in model.dampers]
+    damped = [carriage.pulsates for carriage in model.carriages] + [True for _ in model.dampers]
     damped += [spring.damped for spring in model.springs] + [False for _ in model.pushes]
     springs = [False] * model.first_spring + [not spring.rigid for spring in model.springs]
     springs += [False for _ in model.pushes]

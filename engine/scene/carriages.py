@@ -24,7 +24,18 @@ from engine.study_file.spec import (
     form_of_amount,
     kinds,
 )
-from engine.study_file.units import Damping, Force, Inertia, Length, Mass, Stiffness, Time, fault
+from engine.study_file.units import (
+    Angle,
+    Damping,
+    Force,
+    Frequency,
+    Inertia,
+    Length,
+    Mass,
+    Stiffness,
+    Time,
+    fault,
+)
 
 MAX_CONTACTS = 12
 POINT = (
@@ -103,6 +114,11 @@ class Carriage(SpecOfKind):
         return None
 
     @property
+    def pulsates(self) -> bool:
+        """Whether its force swings in time."""
+        return False
+
+    @property
     def pushes(self) -> tuple[Direction, ...]:
         """Directions beside that of its loads in which its inertia acts too."""
         return ()
@@ -172,13 +188,27 @@ class Carriage(SpecOfKind):
         return self
 
 
+class Pulsation(Spec):
+    """What a force swings by: amplitude sin(2 pi frequency t + phase), N, Hz and rad; t counts from the run's start."""
+
+    amplitude: Force
+    frequency: Frequency = Field(gt=0)
+    phase: Angle = 0.0
+
+
 class ForceCarriage(Carriage):
-    """A constant force in N along gravity; negative lifts."""
+    """A force in N along gravity; negative lifts. pulsation: what it swings by beside that, as of a person who walks or
+    of a milling cutter; statics count the force alone."""
 
     forces: ClassVar[tuple[str, ...]] = ("force",)
 
     kind: Literal["force"]
     force: Force
+    pulsation: Pulsation | None = None
+
+    @property
+    def pulsates(self) -> bool:
+        return self.pulsation is not None
 
 
 class GuidedCarriage(Carriage):

@@ -71,6 +71,22 @@ def _check_carriage(study: Study, name: str, carriage: Carriage) -> None:
     for direction in carriage.pushes:
         with _within(study, f"carriage.{name}"):
             check_inertia(study, carriage, direction)
+    if carriage.pulsates:
+        _check_pulsation(study, f"carriage.{name}.pulsation", carriage)
+
+
+def _check_pulsation(study: Study, here: str, carriage: Carriage) -> None:
+    """A pulsating force belongs to a march that is no cycle."""
+    if study.frame:
+        what = "no force pulsates on bodies in frames that move"
+        remedy = "a load with a course that changes in time"
+        raise study.source.fault(here, what, expected="no such key", remedy=remedy)
+    if carriage.motion.period is not None:
+        what = "a force that pulsates does not come round with the cycles of its carriage"
+        raise study.source.fault(here, what, expected="a motion from one place to another, or no such key")
+    if study.solver.fidelity == "static":
+        what = "a force that pulsates is not static"
+        raise study.source.fault("solver.fidelity", what, expected='"auto"', remedy=f"leave out {here}")
 
 
 def _check_sensor(study: Study, name: str, sensor: Sensor) -> None:

@@ -30,6 +30,7 @@ LANE_KEYS = re.compile(
     r"|body\.\w+\.(damping_ratio(\..+)?|supports\.\d+\.damping|spring\.\w+\.(rotational_)?damping\.\d)"
     r"|carriage\.\w+\.(mass|wheel_mass|stiffness|damping|force|delay|headway)"
     r"|carriage\.\w+\.contacts\.\w+\.damping"
+    r"|carriage\.\w+\.pulsation\.(amplitude|frequency|phase)"
     r"|carriage\.\w+\.motion\.(speed|frequency)"
 )
 #: Keys of numbers of modes, elements and steps.
@@ -58,6 +59,18 @@ class SpringKeys(NamedTuple):
 def keys_of_carriage(name: str, keys: Sequence[str]) -> tuple[str, ...]:
     """The dotted keys of some numbers of a carriage."""
     return tuple(f"carriage.{name}.{key}" for key in keys)
+
+
+def in_use(study: Study, body: str) -> bool:
+    """Whether a body carries a carriage, a robot, a sensor, an envelope, a load or a spring, or its frame moves or
+    holds another one."""
+    moving = [name for carriage in study.carriage.values() for name in carriage.bodies]
+    moving += [name for robot in study.robot.values() for name in robot.rails]
+    moving += [*study.frame, *(frame.on for frame in study.frame.values())]
+    moving += [load.on for load in study.load.values()]
+    moving += [end.on for spring in study.spring.values() for end in spring.ends]
+    read = (*(study.body_of(sensor) for sensor in study.sensor), *(e.body for e in study.envelope.values()))
+    return body in (*moving, *read)
 
 
 def structural(study: Study, cases: Cases) -> list[str]:
@@ -157,6 +170,12 @@ class VariantValues:
     def force(self, carriage: str) -> Array:
         """(V,) N of a carriage besides its weight."""
         return self._sum(carriage, self.study.carriage[carriage].forces)
+
+    def pulsation(self, carriage: str) -> tuple[Array, Array, Array]:
+        """(V,) amplitude in N, angular frequency in rad/s and phase in rad of a force that pulsates."""
+        keys = keys_of_carriage(f"{carriage}.pulsation", ("amplitude", "frequency", "phase"))
+        amplitude, frequency, phase = map(self.column, keys)
+        return amplitude, 2.0 * np.pi * frequency, phase
 
     def touching_mass(self, carriage: str) -> Array:
         """(V,) kg of a carriage that touch the body."""

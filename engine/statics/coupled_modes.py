@@ -125,11 +125,15 @@ def _system(model: SceneModel, values: VariantValues, along: Along) -> _System:
     ties = np.array([*masses, *range(model.first_spring, model.first_push)], dtype=np.int64)
     on_track = from_blocks(lanes.mass, values.size)[masses]
     least = MASSLESS * model.leading_body.modal.mass
-    mass = np.concatenate([1.0 / from_blocks(lanes.inverse_modal_mass, values.size), np.maximum(on_track, least)])
+    mobile = from_blocks(lanes.inverse_modal_mass, values.size)
+    own = np.divide(1.0, mobile, out=np.zeros_like(mobile), where=mobile > 0.0)  # pulsating forces swing by themselves
+    mass = np.concatenate([own, np.maximum(on_track, least)])
     mass[model.residuals] = 0.0  # what kept modes miss between ties is among what these yield
     spring = from_blocks(lanes.spring, values.size)[ties]
+    stiffness = np.concatenate([model.omega**2, np.zeros(len(masses))])
+    stiffness[model.pulses] = model.first_omega**2
     return _System(
-        stiffness=np.concatenate([model.omega**2, np.zeros(len(masses))]),
+        stiffness=stiffness,
         mass=np.ascontiguousarray(mass.T),
         rows=_rows(model, along, ties, len(masses)),
         missed=_missed(model, along, ties),

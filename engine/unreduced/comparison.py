@@ -94,6 +94,10 @@ def compare_variant(plan: Plan, variant: int, spent: Flat, check: Callable[[], N
 def check_unreduced(study: Study) -> None:
     """Refuse a study that asks for the unreduced model and has none, by its scene without sweep. Raises BadInput."""
     if study.output.unreduced and study.carriage:
+        for name, carriage in study.carriage.items():
+            if carriage.pulsates:
+                what, expected = "the unreduced model has no force that pulsates", "no such key, or unreduced = 0"
+                raise study.source.fault(f"carriage.{name}.pulsation", what, expected=expected)
         check_march(unreduced_model(study.without_sweep()))
 
 

@@ -141,9 +141,10 @@ def _scales_of_ends(results: Results, stem: str, own: xr.DataArray) -> tuple[Any
 
 
 def _is_pushed(results: Results, sensor: str) -> bool:
-    """Whether a carriage pushes a sensor's body along its track: its errors are over its own largest value then."""
-    body = results.study.body_of(sensor)
-    return any("along" in carriage.pushes and carriage.on == body for carriage in results.study.carriage.values())
+    """Whether a carriage pushes a sensor's body as statics do not count, along its track or by a force that pulsates:
+    its errors are over its own largest value then."""
+    on = [own for own in results.study.carriage.values() if own.on == results.study.body_of(sensor)]
+    return any("along" in carriage.pushes or carriage.pulsates for carriage in on)
 
 
 def _largest(parts: list[xr.DataArray]) -> xr.DataArray:

@@ -17,7 +17,7 @@ from results_schema.arrays import Array, Counts
 from results_schema.lazy_imports import xr
 from results_schema.quantities import QUANTITIES
 from studies.findings.amplification import sizes
-from studies.findings.theory import along_track
+from studies.findings.theory import along_track, first_omega
 from studies.results.axes import VARIANT, Axis
 from studies.results.formatting import ALIKE, number, percent
 from studies.results.places import Index
@@ -38,6 +38,7 @@ ACCELERATION, NO_DECAY = 2, 1e-12  # order by time
 #: Of what is read, at least, a swing that the answer tells: of a third mode it was a hundredth, with no peak to see.
 TOLD_OF_LARGEST = 0.2
 BEYOND = 1.5  # times a speed, up to which values climb to a resonance: those of a 15 m bridge did from 0.66 of it on
+NEAR = 0.05  # of a frequency: a force that pulsates so near to it is told to push in step
 DAMPING = ".damping_ratio"  # which moves no speed
 WITH_MASSES = " with them on it"
 
@@ -226,6 +227,20 @@ def told_in_step(results: Results, place: Index) -> str:
         f" Axles of {name} push in step with a frequency of {results.study.train[name].on}"
         f"{WITH_MASSES * masses_ride(results.study, name)} ({number(one.frequency)} Hz) most strongly at {where}."
     )
+
+
+def told_pulsation(results: Results, place: Index) -> str:
+    """That a force pulsates with the first frequency of the body that it crosses, nearly, at a place of the sweep."""
+    for name, carriage in results.study.carriage.items():
+        if carriage.pulsates and carriage.on == results.carriage.on:
+            key = f"carriage.{name}.pulsation.frequency"
+            pulse, own = (
+                float(results.everywhere(value)[place])
+                for value in (results.parameter(key), first_omega(results) / (2.0 * np.pi))
+            )
+            if abs(pulse - own) <= NEAR * own:
+                return f" There {name} pulsates in step with the first frequency of {carriage.on} ({number(own)} Hz)."
+    return ""
 
 
 def told_between_speeds(results: Results) -> str:

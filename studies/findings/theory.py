@@ -31,7 +31,7 @@ def first_omega(results: Results) -> xr.DataArray | float:
     axes = [axis for axis in results.axes if any(_changes_modes(results, path) for path in axis.paths)]
     dims = list(dict.fromkeys(axis.dim for axis in axes))
     if not dims:
-        return _model(results, {}).first_omega
+        return results.base_model.first_omega
     sizes = [len(results.dataset[dim]) for dim in dims]
     omega = np.empty(sizes)
     for place in np.ndindex(*sizes):
@@ -98,7 +98,7 @@ def first_mode_bears(results: Results) -> bool:
     if recorded is not None:
         omega, shapes = 2.0 * np.pi * recorded["frequency"].values, recorded["mode_shape"].values.T
     else:
-        modal = _model(results, {}).leading_body.modal
+        modal = results.base_model.leading_body.modal
         omega, shapes = modal.omega, modal.shape(np.linspace(0.0, modal.length, PROBED))
     elastic = omega > 0.0
     borne = np.mean(shapes[:, elastic] ** 2, axis=0) / omega[elastic] ** 2
@@ -182,7 +182,7 @@ def _rigid_modes(results: Results) -> int:
     recorded = results.recorded(results.carriage.on)
     if recorded is not None:
         return int(np.count_nonzero(recorded["frequency"].values == 0.0))
-    return _model(results, {}).leading_body.modal.rigid_modes
+    return results.base_model.leading_body.modal.rigid_modes
 
 
 def elastic_modes(results: Results, places: Array) -> tuple[Array, Array]:
@@ -190,7 +190,7 @@ def elastic_modes(results: Results, places: Array) -> tuple[Array, Array]:
     kg^(-1/2); without motions as a rigid body."""
     recorded = results.recorded(results.carriage.on)
     if recorded is None:
-        modal = _model(results, {}).leading_body.modal
+        modal = results.base_model.leading_body.modal
         return modal.omega[modal.rigid_modes :], modal.shape(places, 0)[:, modal.rigid_modes :]
     omega = 2.0 * np.pi * recorded["frequency"].values
     shapes = interpolate.CubicSpline(along_track(recorded), recorded["mode_shape"].values, axis=1)(places)

@@ -41,7 +41,7 @@ from studies.findings.effects import (
     unchanged,
 )
 from studies.findings.envelopes import beyond_sensors, sizes_along, told_along
-from studies.findings.in_step import told_between_speeds, told_in_step
+from studies.findings.in_step import told_between_speeds, told_in_step, told_pulsation
 from studies.findings.residual import asks_of_rest, check_residual, crosses, most_ringing, residuals
 from studies.protocol.study import Kind, question_of
 from studies.results.axes import PACES, VARIANT
@@ -198,10 +198,10 @@ def _effects(results: Results, envelopes: list[str], sensors: list[str]) -> str:
 
 
 def _in_step(results: Results, envelopes: list[str], sensors: list[str]) -> str:
-    """Where axles push in step, as seen from where what the answer begins with is largest."""
+    """Where axles or a pulsation push in step, as seen from where what the answer begins with is largest."""
     values = sizes_along(results, envelopes[0]) if envelopes else sizes(results, sensors[0])
     top = largest(results, values)
-    return "" if top is None else told_in_step(results, top)
+    return "" if top is None else told_in_step(results, top) + told_pulsation(results, top)
 
 
 def _amplified(results: Results, sensor: str) -> str:

@@ -21,6 +21,7 @@ from studies.results.formatting import number, quantity, typed_unit
 from studies.results.places import Index
 
 if TYPE_CHECKING:
+    from engine.model.scene_model import SceneModel
     from engine.scene.carriages import Carriage
     from engine.scene.sensors import Envelope, Sensor
     from engine.scene.study import Study
@@ -184,6 +185,13 @@ class Results:
     def recorded(self, body: str) -> xr.Dataset | None:
         """What the archive holds of a body out of files, whose model cannot be built without them; else None."""
         return None if self.study.body[body].recorded is None else self.models[body]
+
+    @cached_property
+    def base_model(self) -> SceneModel:
+        """The scene without its sweep, as it is marched."""
+        from engine.model.scene_model import build_model
+
+        return build_model(self.study.without_sweep(), {}, {})
 
     @cached_property
     def envelopes(self) -> dict[str, str]:
