@@ -101,12 +101,15 @@ def _check_sensor(study: Study, name: str, sensor: Sensor) -> None:
 def _check_drive(study: Study, name: str, sensor: Sensor) -> None:
     """Refuse a drive that is not there, or of a joint that moves otherwise."""
     fault, on = study.source.fault, str(sensor.body)
-    found = (study.frame.get(on) or Frame()).driven(sensor.joint)
+    frame = study.frame.get(on) or Frame()
+    found = frame.driven(sensor.joint)
     if len(found) != 1:
         number = "" if sensor.joint is None else f" {sensor.joint}"
         what = f"the joint{number} of {on} whose drive this reads is not one with a motion"
-        expected = f"joint: a number of frame.{on}.joints, from 0 on, which has a motion"
-        raise fault(f"sensor.{name}.joint", what, expected=expected, received=f"{len(found)} such")
+        driven = ", ".join(map(str, frame.driven(None)))
+        expected = f"joint: of frame.{on}.joints, counted from 0, one with a motion: {driven or 'none has one'}"
+        received = f"{len(found)} such" if sensor.joint is None else f"joint = {sensor.joint}"
+        raise fault(f"sensor.{name}.joint", what, expected=expected, received=received)
     wanted = "drive_torque" if study.frame[on].joints[found[0]].turns else "drive_force"
     if sensor.quantity != wanted:
         what = f"frame.{on}.joints.{found[0]} {'turns' if wanted == 'drive_torque' else 'slides'}"

@@ -118,7 +118,7 @@ class Arm(Solid):
 
     mass: Mass = Field(gt=0)
     rail: Sliding
-    links: Annotated[Several[AnyLink], Field(min_length=1, max_length=MOST_LINKS)]
+    links: Annotated[Several[AnyLink], Field(max_length=MOST_LINKS)] = ()
     tool: Place = (0.0, 0.0, 0.0)
 
     @property
@@ -188,4 +188,6 @@ def check_robots(
         given = {"start": robot.start} | {f"moves.{number}.to": move.to for number, move in enumerate(robot.moves)}
         for key, values in given.items():
             if len(values) != wanted:
-                yield f"{here}.{key}", "one value for each joint, the place along the rail first", f"{wanted} numbers"
+                what = f"one value for each joint: the place along the rail, and then the links of arm.{robot.arm}"
+                numbers = f"{wanted} number{'s' * (wanted > 1)}, and not {len(values)}"
+                yield f"{here}.{key}", what, numbers

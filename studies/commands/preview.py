@@ -142,6 +142,7 @@ def _expected(parts: Pieces, seconds: float, threads: int) -> str:
 
 def _measured(seen: Foreseen, around: float, threads: int) -> str:
     room = f"about {size(seen.bytes)} for the archive, and as much for its parts while it runs"
+    room = room if seen.bytes else "with an archive of a size that nothing tells yet"
     return f"About {duration(seen.seconds + around)} on {counted(threads, 'thread')}, {room}."
 
 

@@ -239,7 +239,8 @@ def told_pulsation(results: Results, place: Index) -> str:
                 for value in (results.parameter(key), first_omega(results) / (2.0 * np.pi))
             )
             if abs(pulse - own) <= NEAR * own:
-                return f" Where it is largest {name} pulsates in step with the first frequency of {carriage.on} ({number(own)} Hz)."
+                first = f"the first frequency of {carriage.on} ({number(own)} Hz)"
+                return f" Where it is largest {name} pulsates in step with {first}."
     return ""
 
 

@@ -274,7 +274,8 @@ def _shortest(results: Results, sensors: Sequence[str]) -> str:
     rest = tuple(results.dims.index(axis.dim) for axis in given if axis not in each)
     longest = np.where(np.isnan(values), np.inf, values).max(axis=rest, keepdims=True)
     values, rows = np.where((values == longest) & np.isfinite(longest), values, np.nan), dict[str, list[str]]()
-    for own in product(*(chosen(np.sort(axis.values).tolist(), MOST_BEST) for axis in each)):
+    settled = {axis: _settled(results, values, axis) for axis in each}
+    for own in product(*(chosen(settled[axis], MOST_BEST) for axis in each)):
         pairs = list(zip(each, own, strict=True))
         here = [results.everywhere(results.dataset[axis.name]) == value for axis, value in pairs]
         among = np.where(np.all(here, axis=0), values, np.nan) if here else values
@@ -286,7 +287,17 @@ def _shortest(results: Results, sensors: Sequence[str]) -> str:
     end = f", at the worst {listed(worst)}" * bool(worst) + f", whatever {listed(sorted(same))}" * bool(same)
     if not found:
         return f"{NEVER}{end}"
+    others = [f"{axis.values.size - len(own)} other values of {axis.noun}" for axis, own in settled.items()]
+    never = listed([*filter(None, [never]), *(word for word in others if not word.startswith("0 "))])
     return f"move and settling take at least {listed(found)}{end}{f'; {NEVER} at {never}' * bool(never)}"
+
+
+def _settled(results: Results, values: Array, axis: Axis) -> list[float]:
+    """The values of a swept number, or of many those alone at which something has settled, if any."""
+    own = np.sort(axis.values)
+    along = results.everywhere(results.dataset[axis.name])
+    known = [value for value in own.tolist() if np.isfinite(values[along == value]).any()]
+    return known if known and own.size > MOST_BEST else own.tolist()
 
 
 def _changes_best(results: Results, values: Array, given: Sequence[Axis], axis: Axis) -> float:

@@ -110,8 +110,8 @@ class Axis:
 
     @property
     def sets_motion(self) -> bool:
-        """Whether it sets a number of a motion."""
-        return any(".motion." in path for path in self.paths)
+        """Whether it sets a number of a motion, or when one begins: what is there to choose."""
+        return any(".motion." in path for path in self.paths) or self.sets("delay", "headway")
 
     def sets(self, *endings: str) -> bool:
         """Whether one of the keys that it sets ends so."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,8 +24,23 @@ def remarks(study: Study) -> tuple[str, ...]:
     from engine.scene.sweep import expand
 
     cases = expand(study)
-    found = [*doubtful(study, cases), *half_united(study), *_pushed_along(study, cases)]
+    found = [*doubtful(study, cases), *half_united(study), *_pushed_along(study, cases), *_idle(study), *_in_one(study)]
     return tuple(dict.fromkeys(found))
+
+
+def _idle(study: Study) -> Iterator[str]:
+    """Robots that nobody tells to do anything."""
+    for name, robot in study.robot.items():
+        if not robot.moves:
+            yield f"{name} has no moves and stands where it starts: are [[robot.{name}.moves]] missing?"
+
+
+def _in_one(study: Study) -> Iterator[str]:
+    """Robots that start at one place of a rail."""
+    for (one, first), (other, second) in combinations(study.robot.items(), 2):
+        if set(first.rails) & set(second.rails) and first.start[:1] == second.start[:1]:
+            place = quantity(first.start[0], "m")
+            yield f"{one} and {other} start at one place of their rails, {place}, and nothing keeps robots apart"
 
 
 def _pushed_along(study: Study, cases: Cases) -> Iterator[str]:

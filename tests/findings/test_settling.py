@@ -180,3 +180,31 @@ def test_what_a_variant_has_not_has_no_error() -> None:
 def test_statics_tell_no_residual_vibration() -> None:
     with pytest.raises(BadInput, match=r"solver\.fidelity: statics do not swing on"):
         studies.run(stops(solver={"fidelity": "static"}))
+
+
+def test_of_many_values_those_are_told_at_which_something_settles() -> None:
+    """Four of nine evenly spread were looked at, none of which settled, and so it was said of all."""
+    sensors = {"midspan": {"body": "bed", "at": 0.5, "settling_band": 8e-3}}
+    sweep = SWEPT | {"push": {"of": "carriage.car.force", "from": 1.0, "to": 2.0, "count": 9}}
+    found = studies.run(stops(sweep=sweep, sensor=sensors, output={"residual": True, "histories": "none"}))
+    dims = ("acceleration", "push")
+    times = found.midspan_move_and_settle_time.transpose(*dims)
+    known = np.full(times.shape, np.nan)
+    known[:, 7] = 3.0 + 0.1 * np.arange(times.shape[0])
+    found["midspan_move_and_settle_time"], found["midspan_settling_time"] = (
+        times.copy(data=known * k) for k in (1, 0.5)
+    )
+    said = re.sub(r" ± \S+ \S+", "", answers.answer(found)[0])
+    assert f"move and settling take at least 3 s at acceleration {STEPS[0]} m/s²" in said and "(push 1.88 N)" in said
+    assert "no motion has settled when the run ends at 8 other values of push" in said
+
+
+def test_when_a_carriage_sets_off_is_there_to_choose() -> None:
+    """The best delay is told as the best acceleration is, and not one for each."""
+    sensors = {"midspan": {"body": "bed", "at": 0.5, "settling_band": 8e-3}}
+    sweep = {"delay": {"of": "carriage.other.delay", "from": 0.0, "to": 0.2, "count": 3}}
+    both = {"car": force(2.0, MOVE), "other": force(1.0, MOVE)}
+    output = {"residual": True, "histories": "none"}
+    given = study(beam(modes=1, damping_ratio=0.1), both, sensor=sensors, sweep=sweep, output=output)
+    (said,) = (text for text in answers.answer(studies.run(given)) if "move and settling take" in text)
+    assert "at least at delay" in said and "(delay" not in said

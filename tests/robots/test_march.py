@@ -8,12 +8,12 @@ from scipy.sparse.linalg import spsolve
 
 from engine.bodies.frame.assembly import assemble
 from engine.bodies.frame.frame import Frame
-from engine.kernels.robots.layout import Record
+from engine.kernels.robots.layout import SEEN_ACTUAL, Record
 from engine.robots.march import rest, stretches
 from engine.robots.model import RobotModel, build
 from engine.scene.study import Study
 from tests.naive.robots_as_particles import SECOND, STEP, Scene, driven_by, virtual_work
-from tests.robots.scenes import AVERAGE_ACCELERATION, FOX_GOODWIN, errors, marched, scene
+from tests.robots.scenes import AVERAGE_ACCELERATION, FOX_GOODWIN, drive, errors, marched, scene
 
 STIFF = 100.0  # times the stiffness of the rails: their rotations, small in the theory, are 1e-6 then
 
@@ -275,3 +275,16 @@ def test_few_modes_do_what_all_of_them_do() -> None:
     few, whole = (errors(marched(scene({"modes": modes}), 0.004, every=5)[1]) for modes in (6, 40))
     few, whole = (one - one[0] for one in (few, whole))
     assert np.abs(few - whole).max() < 1e-2 * np.abs(whole).max()
+
+
+def test_an_arm_without_links_is_one_whose_link_stands_still() -> None:
+    """A carriage of 300 kg, or one of 200 kg with a slide of 100 kg that does not move."""
+    still, solid = {"kind": "prismatic", "axis": [0, 1, 0], "mass": 100, **drive()}, {"rail": drive()}
+    arms = {"bare": solid | {"mass": 300}, "slides": solid | {"mass": 200, "links": [still]}}
+    found = []
+    for name, more in (("bare", []), ("slides", [0.0])):
+        robot = {"arm": name, "rails": ["right"], "start": [3.0, *more], "moves": [{"to": [6.0, *more]}]}
+        model, record = marched(scene(arm={name: arms[name]}, robot={"r": robot}), 0.004, every=25)
+        found.append((record.coordinates[:, : model.modes, 0], record.robots[..., SEEN_ACTUAL : SEEN_ACTUAL + 3]))
+    for bare, slides in zip(*found, strict=True):
+        assert np.abs(bare - slides).max() <= 1e-9 * np.abs(bare).max() > 0.0

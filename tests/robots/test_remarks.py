@@ -30,3 +30,13 @@ def test_an_ordinary_study_of_robots_is_not_remarked_and_odd_numbers_are() -> No
     assert tuple(KIND.remarks(scene())) == ()
     (said,) = KIND.remarks(scene().with_values({"body.left.section.box.density": 7.85}))
     assert said.startswith("body.left.section.box.density = 7.85 kg/m3: no beam has this")
+
+
+def test_robots_that_do_nothing_or_start_in_one_place_are_remarked() -> None:
+    robots = dict(scene().data["robot"])
+    still = scene(robot={**robots, "hanging": robots["hanging"] | {"moves": []}})
+    (said,) = KIND.remarks(still)
+    assert said.startswith("hanging has no moves and stands where it starts")
+    beside = scene(robot={**robots, "hanging": robots["hanging"] | {"start": [3.0, 0.0, 0.0]}})
+    (said,) = KIND.remarks(beside)
+    assert said == "portal and hanging start at one place of their rails, 3 m, and nothing keeps robots apart"

@@ -59,6 +59,8 @@ def section_doubts(here: str, length: str, *fibres: str) -> list[Doubt]:
         doubt(Pressure, "MPa=GPa", material, "above 5e8 Pa for what is denser than 2000 kg/m3", _stiff_where_heavy),
         doubt(Density, "g/cm^3 t/mm^3", material[1:], "20 to 50000 kg/m3, steel 7850", _density_of_matter),
         doubt(Length, "mm cm", (length,), "1e-4 to 1e4 m", lambda size: (size >= 1e-4) & (size <= 1e4)),
+        doubt(Length, "mm cm", (length, area, inertia), "at most 5000 times sqrt(second_moment/area), in m",
+              lambda along, across, size: (along**2 * across <= 5000**2 * size) | (across > along**2 / 4)),
         doubt(Area, "mm^2 cm^2", (area, length), "at most length^2/4, in m2",
               lambda size, along: size <= along**2 / 4),
         doubt(SecondMoment, "mm^4 cm^4", (inertia, area, length), "at most area x length^2/16, in m4",

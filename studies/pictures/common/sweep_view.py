@@ -211,8 +211,14 @@ def draw_curves(axes: Axes, seen: View, curves: Sequence[Curve]) -> None:
 
 
 def _draw_curve(axes: Axes, curve: Curve, colour: Any) -> None:
-    """A curve, with marks where its points are few; dashed from and to every point that is known loosely."""
-    marker = "o" if np.isfinite(curve.y).sum() <= 12 else ""
+    """A curve, with marks where its points are few or stand between gaps; dashed from and to every point that is known
+    loosely."""
+    known = np.isfinite(curve.y)
+    marker = "o" if known.sum() <= 12 else ""
+    beside = np.pad(known, 1)
+    alone = known & ~beside[:-2] & ~beside[2:]
+    if alone.any() and not marker:
+        axes.plot(curve.x[alone], curve.y[alone], "o", color=colour, markersize=4)
     loose = np.zeros(curve.y.shape, dtype=bool) if curve.loose is None else curve.loose
     axes.plot(curve.x, np.where(loose, np.nan, curve.y), color=colour, marker=marker, label=curve.label)
     if loose.any():

@@ -164,7 +164,9 @@ def test_told_errors_are_those_of_the_closed_form() -> None:
 def test_the_answer_names_the_frequency() -> None:
     sweep = {"pace": {"of": "carriage.car.pulsation.frequency", "from": 1.2, "to": 2.0, "count": 9}}
     found = studies.run(crossing({"amplitude": 1.0, "frequency": 1.0}, cruise(0.0, 1.0, 0.1), sweep=sweep))
-    assert "Where it is largest car pulsates in step with the first frequency of bed (1.57 Hz)." in " ".join(answer(found))
+    assert "Where it is largest car pulsates in step with the first frequency of bed (1.57 Hz)." in " ".join(
+        answer(found)
+    )
     speeds = {"speed": {"of": "carriage.car.motion.speed", "values": [0.3, 0.4]}}
     away = crossing({"amplitude": 1.0, "frequency": 0.9}, sweep=speeds)
     assert "pulsates in step" not in " ".join(answer(studies.run(away)))
