@@ -224,7 +224,9 @@ def where(results: Results, beyond: Mask, axis: Axis | None) -> str:
 
 
 def _everywhere(axis: Axis) -> str:
-    return "both ways" if axis.sets(DIRECTION) else f"everywhere from {axis.span}"
+    if axis.sets(DIRECTION):
+        return "both ways"
+    return f"everywhere from {'' if axis.units else f'{axis.noun} '}{axis.span}"
 
 
 def _has_samples(results: Results, axis: Axis) -> bool:

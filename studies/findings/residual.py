@@ -190,7 +190,7 @@ def _residual(results: Results, sensor: str, asked: AskedOfRest) -> str:
     error = float(doubt[place])  # parts of a static value mislead here
     said = (
         f"{sensor}: {while_held(results)}after {since(results)} it still swings by up to {quantity(size, units)}"
-        f"{told_error(error, size, units)}{in_words(results, place)}"
+        f"{told_error(error, size, units)}{in_words(results, place)}{_told_least(results, values, units)}"
     )
     axis = next(iter(by_effect(results, values)), None)
     limit = asked.residual.of(results.study.sensor[sensor])
@@ -201,6 +201,24 @@ def _residual(results: Results, sensor: str, asked: AskedOfRest) -> str:
     over = f"over {axis.noun} " if axis is not None and axis.dim != VARIANT else ""
     beyond = f"{quantity(limit, units)}{out_of_reach(limit, size)} {where_beyond(results, values, limit, axis)}"
     return f"{said}; {over}it exceeds {beyond}{settled}.{between}"
+
+
+def _told_least(results: Results, values: Array, units: str) -> str:
+    """At which motions or delays it swings least, at the worst of what is not there to choose, behind where most; ""
+    where there are no more than two to choose from, or all are alike."""
+    free = [axis for axis in results.axes if axis.sets_motion and axis.values.size > 1 and not axis.sets(DIRECTION)]
+    if VARIANT in results.dims or prod(axis.values.size for axis in free) <= 2:
+        return ""
+    own = {results.dims.index(axis.dim) for axis in free}
+    others = tuple(n for n in range(values.ndim) if n not in own)
+    worst = np.where(results.with_values & np.isfinite(values), values, np.inf).max(axis=others, keepdims=True)
+    place = np.unravel_index(int(np.argmin(worst)), worst.shape)
+    least, most = float(worst[place]), float(worst.max(initial=0.0, where=np.isfinite(worst)))
+    if not np.isfinite(least) or least > (1.0 - ALIKE) * most:
+        return ""
+    where = ", ".join(axis.at(place[results.dims.index(axis.dim)]) for axis in free)
+    end = " at the worst of all else" if prod(values.shape[n] for n in others) > 1 else ""
+    return f", and least, by up to {quantity(least, units)}{end}, at {where}"
 
 
 def _told_between(results: Results, values: Array, place: Index) -> str:
