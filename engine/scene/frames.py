@@ -49,6 +49,7 @@ class Joint(SpecOfKind):
     freedoms: ClassVar[int] = 1
     turns: ClassVar[bool] = True
     slides: ClassVar[bool] = False
+    floats: ClassVar[bool] = False
 
     @property
     def is_driven(self) -> bool:
@@ -167,6 +168,7 @@ class Free(Joint):
 
     freedoms: ClassVar[int] = 6
     slides: ClassVar[bool] = True
+    floats: ClassVar[bool] = True
     kind: Literal["free"]
     velocity: Velocity = (0.0, 0.0, 0.0)
     rate: Spin = (0.0, 0.0, 0.0)

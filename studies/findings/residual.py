@@ -216,7 +216,7 @@ def _told_least(results: Results, values: Array, units: str) -> str:
     least, most = float(worst[place]), float(worst.max(initial=0.0, where=np.isfinite(worst)))
     if not np.isfinite(least) or least > (1.0 - ALIKE) * most:
         return ""
-    where = ", ".join(axis.at(place[results.dims.index(axis.dim)]) for axis in free)
+    where = ", ".join(axis.at(int(place[results.dims.index(axis.dim)])) for axis in free)
     end = " at the worst of all else" if prod(values.shape[n] for n in others) > 1 else ""
     return f", and least, by up to {quantity(least, units)}{end}, at {where}"
 

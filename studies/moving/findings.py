@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from engine.march.settling import names_of_times
+from engine.scene.frames import GROUND
 from results_schema.quantities import AFTER_STOP
 from studies.findings.absolute_errors import errors_of_size
 from studies.findings.amplification import sizes
@@ -34,6 +35,7 @@ def others(results: Results, seconds: float) -> Iterator[str]:
     yield from _driven(results)
     yield from _ends(results)
     yield from _energy(results)
+    yield from _momentum(results)
     yield from _beyond_theory(results)
     yield from told_statuses(results)
 
@@ -197,6 +199,26 @@ def _energy(results: Results) -> Iterator[str]:
             f"The energy of everything (motion, bending, springs and height) changes by up to {most}"
             f"{in_words(results, index)}: by what is driven, by damping and friction, and else by the steps."
         )
+
+
+def _momentum(results: Results) -> Iterator[str]:
+    """How far the momentum of everything drifts where nothing outside acts on it, which by theory is not at all."""
+    study = results.study
+    roots = [frame for frame in study.frame.values() if frame.on == GROUND]
+    held = not all(any(joint.floats for joint in frame.joints) for frame in roots) or set(study.body) > set(study.frame)
+    held |= any(end.on == GROUND for spring in study.spring.values() for end in spring.ends)
+    if held or study.load or study.gravity > 0.0 or not (traced := results.traced()):
+        return
+    told = []
+    for name, units in (("momentum", "kg m/s"), ("angular_momentum", "kg m2/s")):
+        over_time = [results.dataset[name].values[place] for place in traced]
+        drift = max(float(np.nanmax(np.abs(values - values[0]))) for values in over_time)
+        most = max(float(np.nanmax(np.abs(values))) for values in over_time)
+        told.append(f"by up to {quantity(drift, units)} of {quantity(most, units)}")
+    yield (
+        f"Nothing outside acts on these bodies, so that their momentum is kept: by the steps it drifts {told[0]}, and "
+        f"the angular momentum {told[1]}."
+    )
 
 
 def _beyond_theory(results: Results) -> Iterator[str]:

@@ -28,6 +28,9 @@ from studies.results.results import Results
 
 Limited = tuple[float | None, float | None]  # in the whole time, and after the stop
 MOST_ROWS, MOST_CURVES, MOST_TIPS = 5, 4, 3
+SMALL = (
+    0.02  # of the largest value: a limit below stands on an axis of powers of ten, or it would lie on the axis itself
+)
 
 
 def pictures(results: Results) -> list[Figure]:
@@ -95,12 +98,17 @@ def _draw_tips(seen: View, tips: list[str], limits: Limited, drawing: Drawing) -
     columns = [("", "in the whole time"), (AFTER_STOP, "after the stop")][: 1 + stops]
     grid = drawing.subplots(len(tips), len(columns), squeeze=False, sharex=True, sharey="row")
     for row, tip in zip(grid, tips, strict=True):
-        scale = scale_for(float(np.nanmax(sizes(seen.results, tip))), "m")
+        largest = float(np.nanmax(sizes(seen.results, tip)))
+        scale, known = scale_for(largest, "m"), [limit for limit in limits[: len(columns)] if limit is not None]
+        by_tens = any(limit < SMALL * largest for limit in known)
         for axes, (end, when), limit in zip(row, columns, limits[: len(columns)], strict=True):
             values = seen.results.dataset["status"].copy(data=sizes(seen.results, f"{tip}{end}") * scale.factor)
             draw_curves(axes, seen, seen.curves(values))
             axes.set_title(f"{tip.replace('_', ' ')}{along_way(seen.results, tip)} {when}")
-            axes.set_ylim(0.0, None)
+            if by_tens:
+                axes.set_yscale("log")
+            else:
+                axes.set_ylim(0.0, None)
             if limit is not None and limit * scale.factor <= axes.get_ylim()[1]:
                 limit_line(axes, limit * scale.factor, f"limit {quantity(limit, 'm')}", "left")
         row[0].set_ylabel(seen.results.label(tip, scale.unit, "largest"))

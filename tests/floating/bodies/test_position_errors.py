@@ -274,6 +274,10 @@ def test_a_limit_after_the_stop_is_told_behind_it(coarse: xr.Dataset) -> None:
         (drawn,) = (one for one in pictures(Results(coarse, given)) if one.name == "position-errors")
         lines = [line.get_label() == LIMIT for axes in drawn.drawing.axes for line in axes.get_lines()]
         assert any(lines) == (expected == "exceeds")
+        assert {axes.get_yscale() for axes in drawn.drawing.axes} == {"linear"}
+    given = Results.of(coarse).study.with_values({"question.residual": {"position_error": 0.01 * most}})
+    (drawn,) = (one for one in pictures(Results(coarse, given)) if one.name == "position-errors")
+    assert {axes.get_yscale() for axes in drawn.drawing.axes} == {"log"}  # or it would lie on the axis
 
 
 def test_a_limit_after_the_stop_that_no_sensor_reads_is_refused() -> None:
