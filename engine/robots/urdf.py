@@ -329,15 +329,13 @@ def _lines(chain: Chain, name: str, turn: Array, source: str) -> Iterator[str]:
         yield f"mass = {_plain(solid.mass)}"
         yield f"centre = {_row(own.T @ solid.centre)}"
         yield f"inertia = {_row(np.maximum(np.diag(own.T @ solid.about_centre @ own), 0.0))}"
+        if joint.ends is not None and joint.ends[0] < joint.ends[1]:
+            yield f"limits = [{', '.join(map(_plain, joint.ends))}]"
         yield _drive(joint.speed or PLAIN_SPEED).replace(", ", "\n")
 
 
 def _remarks(joint: Joint, solid: Solid) -> Iterator[str]:
-    """Comments on what the file does not tell of a link, and on what studies do not heed."""
-    if joint.ends is not None:
-        unit = "m" if joint.kind == "prismatic" else "rad"
-        lower, upper = map(_plain, joint.ends)
-        yield f"# the file limits it to {lower} to {upper} {unit}; plans are not checked against that"
+    """Comments on what the file does not tell of a link."""
     if solid.mass == 0.0:
         yield "# the file tells no mass of it"
     if joint.speed == 0.0:

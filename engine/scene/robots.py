@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, Strict, model_validator
 
 from engine.bodies.frame.frame import Vector
+from engine.study_file.checks import Check
 from engine.study_file.spec import KindOf, Noun, Several, Spec, Three
 from engine.study_file.units import (
     Acceleration,
+    Angle,
     AngularAcceleration,
     AngularJerk,
     AngularRate,
@@ -36,12 +38,14 @@ Values = Several[Dimensionless]
 
 
 class Drive(Spec):
-    """What moves a joint. speed, acceleration, jerk: its limits. stiffness, damping: of the joint with its controller,
-    PD towards the plan; without a stiffness it follows its plan whatever force that takes."""
+    """What moves a joint. speed, acceleration, jerk: its limits. limits: between which the joint itself may stand.
+    stiffness, damping: of the joint with its controller, PD towards the plan; without a stiffness it follows its plan
+    whatever force that takes."""
 
     speed: float
     acceleration: float
     jerk: float
+    limits: tuple[float, float] | None = None
     stiffness: float | None = None
     damping: float = 0.0
 
@@ -54,6 +58,8 @@ class Drive(Spec):
     def _spring_with_damper(self) -> Drive:
         if self.is_rigid and self.damping > 0.0:
             raise fault("a joint that follows its plan rigidly has no damper", expected="a stiffness beside it")
+        if self.limits is not None and self.limits[0] >= self.limits[1]:
+            raise fault("the limits of a joint", expected="the lower one first, and the other above it")
         return self
 
 
@@ -71,6 +77,7 @@ class Sliding(Drive):
     speed: Speed = Field(gt=0)
     acceleration: Acceleration = Field(gt=0)
     jerk: Jerk = Field(gt=0)
+    limits: Annotated[tuple[Length, Length], Strict(False)] | None = None
     stiffness: Stiffness | None = Field(default=None, gt=0)
     damping: Damping = Field(default=0.0, ge=0)
 
@@ -81,6 +88,7 @@ class Turning(Drive):
     speed: AngularRate = Field(gt=0)
     acceleration: AngularAcceleration = Field(gt=0)
     jerk: AngularJerk = Field(gt=0)
+    limits: Annotated[tuple[Angle, Angle], Strict(False)] | None = None
     stiffness: RotationalStiffness | None = Field(default=None, gt=0)
     damping: RotationalDamping = Field(default=0.0, ge=0)
 
@@ -191,3 +199,20 @@ def check_robots(
                 what = f"one value for each joint: the place along the rail, and then the links of arm.{robot.arm}"
                 numbers = f"{wanted} number{'s' * (wanted > 1)}, and not {len(values)}"
                 yield f"{here}.{key}", what, numbers
+
+
+def limit_checks(arms: Mapping[str, Arm], robots: Mapping[str, Robot]) -> Iterator[Check]:
+    """That no joint starts beyond its limits, or is told to go there."""
+    for name, robot in robots.items():
+        for number, drive in enumerate(arms[robot.arm].drives):
+            joint = f"arm.{robot.arm}.links.{number - 1}" if number else f"arm.{robot.arm}.rail"
+            places = ["start", *(f"moves.{move}.to" for move in range(len(robot.moves)))] if drive.limits else []
+            for place in places:
+                key = f"robot.{name}.{place}.{number}"
+                needs = key, f"{joint}.limits.0", f"{joint}.limits.1"
+                what = "a joint beyond its limits"
+                yield Check(key, needs, _between, what, f"what lies between {joint}.limits")
+
+
+def _between(value: Any, low: Any, high: Any) -> Any:
+    return (value >= low) & (value <= high)

@@ -19,7 +19,7 @@ from engine.scene.dotted_keys import numbers_in, value_in, with_value
 from engine.scene.frames import Frame, inertia_checks
 from engine.scene.loads import Load, Spring
 from engine.scene.references import check_names, check_references
-from engine.scene.robots import Arm, Robot
+from engine.scene.robots import Arm, Robot, limit_checks
 from engine.scene.sensors import Envelope, Sensor
 from engine.scene.settings import Output, Solver, Sweep
 from engine.scene.trains import Trains, axle_name, with_axles
@@ -367,6 +367,7 @@ def checks(study: Study) -> Iterator[Check]:
             yield from own.checks(name)
     for name, carriage in study.carriage.items():
         yield from carriage.checks(f"carriage.{name}")
+    yield from limit_checks(study.arm, study.robot)
     for name, sensor in study.sensor.items():
         here, read = f"sensor.{name}", f"body.{sensor.body}"
         if sensor.spot is not None:

@@ -198,12 +198,12 @@ def test_a_thin_plate_of_three_digits_is_a_body(file: Path) -> None:
     assert arm_of(file).links[2].inertia == pytest.approx((0.0833, 0.0833, 0.167))
 
 
-def test_comments_tell_what_the_file_does_not_and_what_studies_do_not_heed(file: Path) -> None:
-    limit, guess = "the file limits it to -3 to 3", "the file tells no speed of elbow"
+def test_limits_are_taken_and_comments_tell_what_the_file_does_not(file: Path) -> None:
+    limit, guess = "limits = [-3, 3]", "the file tells no speed of elbow"
     joints = tuple(one.replace('velocity="2"', "") if 'name="reach"' in one else one for one in JOINTS)
     file.write_text(urdf(LINKS | {"upper": ""}, joints))
     carriage, upper, fore, rod = table_of(file, "tool", "odd", TURNED).split("[[arm.odd.links]]")
-    assert "add the carriage that rides" in carriage and f"{limit} rad" in upper and f"{limit} m;" in rod
+    assert "add the carriage that rides" in carriage and limit in upper and limit in rod
     assert [" no mass of it" in link for link in (carriage, upper, fore, rod)] == [False, True, False, False]
     assert "limits" not in fore and guess in fore and "no speed of reach" in rod and "no speed" not in upper
     file.write_text(urdf(LINKS | {"base": "", "cabinet": ""}))
