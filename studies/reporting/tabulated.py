@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 SWEPT = "swept"  # the dimension along which cells name the swept numbers of a variant
 MOST_COLUMNS = 64  # of one result
+ERRORS = ("result",)  # of estimated errors, one for each result however many there are
 ROWS_AT_ONCE = 2**17  # variants, of which a table is in memory
 
 
@@ -117,7 +118,8 @@ def table_of(results: Results, chosen: Sequence[str] = ()) -> tuple[pd.DataFrame
     for name, array in [*((n, dataset[n]) for n in (*dataset.coords, "status")), *dataset.data_vars.items()]:
         own = tuple(dim for dim in array.dims if dim not in rows)
         nowhere = own and (not set(array.dims) & set(rows) if rows else name in of_none)
-        if prod(dataset.sizes[dim] for dim in own) > MOST_COLUMNS or nowhere:
+        many = own != ERRORS and prod(dataset.sizes[dim] for dim in own) > MOST_COLUMNS
+        if many or nowhere:
             left_out += [str(name)] if name in dataset.data_vars else []
             continue
         parts = [_as_typed(swept[str(name)], array)] if name in swept else _columns(str(name), array, own)

@@ -1,5 +1,6 @@
 """Datasets from Python as archives and answers: those that went through files, and those that are refused."""
 
+import csv
 import subprocess
 import sys
 from pathlib import Path
@@ -16,6 +17,7 @@ from studies.commands.cli import main
 from studies.runs.archived import results_of
 from studies.runs.datasets import archive_of
 from studies.runs.not_audited import told_none_briefly
+from tests.engine.build import beam, cruise, fixed, force, study
 from tests.studies import scenes
 
 PASSAGES = scenes.pace("passage")
@@ -81,6 +83,17 @@ def test_an_archive_is_known_to_a_fresh_process(kind: str, call: str, tmp_path: 
     order = [sys.executable, "-c", FIRST, *call.split()]
     done = subprocess.run(order, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def test_estimated_errors_are_exported_however_many_results_there_are(tmp_path: Path) -> None:
+    sensors = {f"s{number}": fixed(number / 17) for number in range(1, 17)}
+    found = studies.run(study(beam(), force(2.0, cruise(0.0, 1.0, 1.0)), sensor=sensors))
+    assert found.sizes["result"] > 64
+    (row,) = csv.DictReader(studies.export(found, tmp_path / "all.csv").read_text().splitlines())
+    for name in found.result.values:
+        if not name.startswith("car"):  # whose force is the same all the way
+            told = float(found.estimated_error.sel(result=name))
+            assert float(row[f"estimated_error {name}"]) == pytest.approx(told, nan_ok=True)
 
 
 def test_a_dataset_is_exported_as_the_command_does(tmp_path: Path) -> None:
