@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from engine.accuracy.grids import AVERAGE_ACCELERATION, SceneGrid, open_scheme
 from engine.accuracy.jobs import Halted
-from engine.accuracy.results import deciding, differences, results_of, worst_held
+from engine.accuracy.results import between_peaks, deciding, differences, results_of, worst_held
 from engine.march.outcome import Asked, Outcome, outcome
 from engine.march.step_rules import least_steps
 from engine.model.numerics import Numerics, open_bodies
@@ -134,6 +134,7 @@ class Rungs:
         model, values, asked = self.model(column), self.values.part(lanes), self.grid.asked
         results = deciding(results_of(asked), asked.study.solver.tolerance)
         error = differences(asked, model, values, now, self.truth.outcome.of(lanes))
+        error = np.maximum(error, between_peaks(asked, now))
         against = error
         if self.aim is not self.truth:
             against = differences(asked, model, values, now, self.aim.outcome.of(lanes))

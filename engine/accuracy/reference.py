@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from engine.accuracy.grids import MODES, SceneGrid, open_scheme, unit_steps
 from engine.accuracy.jobs import InTurn, Job, Share
-from engine.accuracy.results import deciding, differences, results_of, worst_held
+from engine.accuracy.results import between_peaks, deciding, differences, results_of, worst_held
 from engine.accuracy.shown import Shown
 from engine.kernels.schemes import Scheme
 from engine.march.outcome import NOWHERE, USED, Flat, Outcome, number_of, outcome, used
@@ -175,6 +175,7 @@ def converge(
         if pushes_along and not (is_corrected and level == 1):
             stays = STAYS if is_corrected else STAYS_UNCORRECTED
             remaining = np.maximum(remaining, left_along(apart, change[:, active], stays))
+        remaining = np.maximum(remaining, between_peaks(asked, now))
         found = _updated(found, active, now, spent, remaining)
         change[:, active] = apart
         off = worst_held(remaining, decisive, own.tighter)

@@ -190,6 +190,18 @@ def results_of(asked: Asked) -> tuple[Result, ...]:
     return tuple(result for family in FAMILIES for result, _ in family(asked))
 
 
+def between_peaks(asked: Asked, own: Outcome) -> Array:
+    """(R, V) what a march may miss of extremes between stations, over the scale of each result: marches of twice the steps
+    may have the same stations, and then tell nothing of it."""
+    sensors = {f"{name}_{end}": j for j, name in enumerate(asked.study.sensor) for end in ENDS}
+    found = np.zeros((len(results_of(asked)), own.between.size))
+    for r, result in enumerate(results_of(asked) if own.between.any() else ()):
+        if result.name in sensors:
+            size = np.nan_to_num(np.abs(own.numbers[result.name]))
+            found[r] = own.between * size / own.scale[:, sensors[result.name]]
+    return found
+
+
 def differences(asked: Asked, model: SceneModel, values: VariantValues, one: Outcome, other: Outcome) -> Array:
     """(R, V) how far two outcomes of the same variants are apart, by result: over the scale of each that ``other`` has.
     Infinite where only ``one`` has diverged, NaN where the other has."""

@@ -16,6 +16,7 @@ from engine.march.envelopes import MOST_KEPT, envelope_names
 from engine.march.march import Marched
 from engine.march.rest import counts_settling, elapsed, residuals, seconds_at, settling_times
 from engine.march.richardson import march_scheme
+from engine.march.step_rules import between_stations
 from engine.march.tables import SceneTables
 from engine.model.lane_table import in_whole_blocks, weight, weights
 from engine.model.scene_model import SceneModel
@@ -68,24 +69,26 @@ class Asked:
 @dataclass(frozen=True, eq=False)
 class Outcome:
     """What V variants report by one march: numbers (V, ...) by name, histories (H, S, V) of all signals at the stations
-    that were asked for, statuses and the first diverged steps (V,), and (V, J) what errors of the sensors are divided
-    by, infinite for those that read but rounding. other_bands: by sensor (V, 2, ...) the settling times by which the
-    errors of its own are told. shown: histories (V, H) as archives keep them, by name; none where they were not asked
-    for."""
+    that were asked for, statuses and the first diverged steps (V,), (V, J) what errors of the sensors are divided by,
+    infinite for those that read but rounding, and (V,) of `between_stations`. other_bands: by sensor (V, 2, ...) the
+    settling times by which the errors of its own are told. shown: histories (V, H) as archives keep them, by name; none
+    where they were not asked for."""
 
     numbers: Flat
     history: Array
     status: NDArray[np.int8]
     diverged_step: Counts
     scale: Array
+    between: Array
     other_bands: dict[str, Array] = field(default_factory=dict)
     shown: dict[str, Array] = field(default_factory=dict)
 
     def of(self, lanes: Counts | NDArray[np.bool_]) -> Outcome:
         """Some of the variants."""
         numbers = {name: array[lanes] for name, array in self.numbers.items()}
-        rest = self.history[..., lanes], self.status[lanes], self.diverged_step[lanes], self.scale[lanes]
-        return Outcome(numbers, *rest, {name: array[lanes] for name, array in self.other_bands.items()})
+        rest = self.status[lanes], self.diverged_step[lanes], self.scale[lanes], self.between[lanes]
+        bands = {name: array[lanes] for name, array in self.other_bands.items()}
+        return Outcome(numbers, self.history[..., lanes], *rest, bands)
 
     def replaced(self, lanes: Counts, other: Outcome) -> Outcome:
         """The same with the outcome of other marches for some of the variants, at the same stations."""
@@ -95,7 +98,7 @@ class Outcome:
                 array[lanes] = given[name]
         found.history[..., lanes] = other.history
         found.status[lanes], found.diverged_step[lanes] = other.status, other.diverged_step
-        found.scale[lanes] = other.scale
+        found.scale[lanes], found.between[lanes] = other.scale, other.between
         return found
 
 
@@ -133,8 +136,8 @@ def outcome(
         if array.dtype == np.float64:
             array[nothing] = np.nan
     kept = _described(tables, values, shown, marched, counts) if shown.size else {}
-    scale = _scale(tables, values, numbers)
-    return Outcome(numbers, history, status, diverged_step, scale, settling.other_bands, kept)
+    scale, between = _scale(tables, values, numbers), between_stations(tables.model, values, tables.steps)
+    return Outcome(numbers, history, status, diverged_step, scale, between, settling.other_bands, kept)
 
 
 USED = ("fidelity_used", "scheme_used", "modes_used", "steps_used")  # what a variant is marched again by

@@ -56,11 +56,23 @@ def least_steps(model: SceneModel, values: VariantValues) -> Array:
 def pulsation_steps(model: SceneModel, values: VariantValues) -> Array:
     """(V,) steps of which two make a period of the fastest pulsating force, and with which it is within the limit of
     the scheme, and its coordinate takes no mass; 0 without any."""
-    fastest = np.zeros(values.size)
-    for number in model.pulsating:
-        fastest = np.maximum(fastest, values.pulsation(model.carriages[number].name)[1])
+    fastest = _fastest(model, values)
     limit = min(math.pi, model.scheme.oscillator_limit, model.scheme.scaled_from)
     return np.asarray(model.scheme.stride * fastest * values.scene_time_scale / limit)
+
+
+def between_stations(model: SceneModel, values: VariantValues, steps: int) -> Array:
+    """(V,) by which part of itself a peak of what pulsating forces swing may exceed the stations beside it with so many
+    steps per unit of scene time, (Omega h)^2/8: other marches may have the same stations. 0 without any."""
+    return np.asarray((_fastest(model, values) * values.scene_time_scale / steps) ** 2 / 8.0)
+
+
+def _fastest(model: SceneModel, values: VariantValues) -> Array:
+    """(V,) rad/s of the fastest pulsating force; 0 without any."""
+    found = np.zeros(values.size)
+    for number in model.pulsating:
+        found = np.maximum(found, values.pulsation(model.carriages[number].name)[1])
+    return found
 
 
 def _alias(model: SceneModel, scale: Array) -> Array:

@@ -198,3 +198,19 @@ def test_what_refuses_it(what: str) -> None:
     values, said = REFUSED[what]
     with pytest.raises(BadInput, match=said):
         studies.run(crossing(PULSE).with_values(values))
+
+
+def test_peaks_between_stations_are_told_of() -> None:
+    """With twice the steps a peak may lie at the same station: of 61 errors beside closed forms 14 were told too small,
+    some a ninth of the true ones. Between stations a peak exceeds them by up to (W h)^2/8 of itself."""
+    sweep = {"speed": {"of": "carriage.car.motion.speed", "from": 0.3, "to": 0.6, "count": 7}}
+    pulse = {"amplitude": 1.5, "frequency": 5.9, "phase": 4.4}
+    found = studies.run(study(beam(modes="auto"), force(FORCE, cruise(0.0, 1.0, 0.4), pulsation=pulse), sweep=sweep))
+    for n, speed in enumerate(found.speed.values):
+        right = swings(pulse, np.linspace(0.0, 1.0 / speed, 50_001), modes=60, speed=float(speed), zeta=0.0)
+        size = max(np.abs(right).max(), FORCE / 48.0)
+        missed = (2.0 * math.pi * 5.9 / speed / float(found.steps_used[n])) ** 2 / 8.0
+        for end, true in (("max", right.max()), ("min", right.min())):
+            told = float(found.estimated_error[n].sel(result=f"midspan_{end}"))
+            assert abs(float(found[f"midspan_{end}"][n]) - true) / size <= told + 2e-6
+            assert told >= 0.999 * missed * abs(true) / size
