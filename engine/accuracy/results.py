@@ -191,8 +191,8 @@ def results_of(asked: Asked) -> tuple[Result, ...]:
 
 
 def between_peaks(asked: Asked, own: Outcome) -> Array:
-    """(R, V) what a march may miss of extremes between stations, over the scale of each result: marches of twice the steps
-    may have the same stations, and then tell nothing of it."""
+    """(R, V) what a march may miss of extremes between stations, over the scale of each result: marches of twice the
+    steps may have the same stations, and then tell nothing of it."""
     sensors = {f"{name}_{end}": j for j, name in enumerate(asked.study.sensor) for end in ENDS}
     found = np.zeros((len(results_of(asked)), own.between.size))
     for r, result in enumerate(results_of(asked) if own.between.any() else ()):
