@@ -133,11 +133,11 @@ class Rungs:
         """What pilots report on a rung, beside their references."""
         model, values, asked = self.model(column), self.values.part(lanes), self.grid.asked
         results = deciding(results_of(asked), asked.study.solver.tolerance)
-        error = differences(asked, model, values, now, self.truth.outcome.of(lanes))
-        error = np.maximum(error, between_peaks(asked, now))
+        least = between_peaks(asked, now)
+        error = np.maximum(differences(asked, model, values, now, self.truth.outcome.of(lanes)), least)
         against = error
         if self.aim is not self.truth:
-            against = differences(asked, model, values, now, self.aim.outcome.of(lanes))
+            against = np.maximum(differences(asked, model, values, now, self.aim.outcome.of(lanes)), least)
         return March(column, rung, lanes, error, worst_held(against, results), work)
 
     def climb(self, lanes: Counts, halted: Halted, column: int, start: Counts, floor: Array) -> list[March]:

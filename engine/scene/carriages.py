@@ -24,18 +24,7 @@ from engine.study_file.spec import (
     form_of_amount,
     kinds,
 )
-from engine.study_file.units import (
-    Angle,
-    Damping,
-    Force,
-    Frequency,
-    Inertia,
-    Length,
-    Mass,
-    Stiffness,
-    Time,
-    fault,
-)
+from engine.study_file.units import Angle, Damping, Force, Frequency, Inertia, Length, Mass, Stiffness, Time, fault
 
 MAX_CONTACTS = 12
 POINT = (

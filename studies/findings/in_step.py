@@ -38,7 +38,7 @@ ACCELERATION, NO_DECAY = 2, 1e-12  # order by time
 #: Of what is read, at least, a swing that the answer tells: of a third mode it was a hundredth, with no peak to see.
 TOLD_OF_LARGEST = 0.2
 BEYOND = 1.5  # times a speed, up to which values climb to a resonance: those of a 15 m bridge did from 0.66 of it on
-NEAR = 0.05  # of a frequency: a force that pulsates so near to it is told to push in step
+NEAR = 0.05  # of a frequency, as half-power points are with 5 % damping: a force that pulsates so near is in step
 DAMPING = ".damping_ratio"  # which moves no speed
 WITH_MASSES = " with them on it"
 

@@ -53,6 +53,7 @@ def section_doubts(here: str, length: str, *fibres: str) -> list[Doubt]:
         what = "no beam has this"
         return Doubt(needs[0], (*needs, *material), holds, what, expected, unit_of(dimension), tuple(others.split()))
 
+    # The slenderest masts are some 500 radii of gyration long; a length in mm is a thousand times what was meant.
     area, inertia = f"{here}.area", f"{here}.second_moment"
     return [
         doubt(Pressure, "GPa MPa", material[:1], "1e5 to 2e12 Pa, steel 2.1e11", _modulus_of_matter),

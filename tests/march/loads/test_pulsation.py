@@ -132,12 +132,11 @@ def test_beside_a_mass_and_a_sprung_one() -> None:
         return np.array([*v, *force_of, dz, spring / 0.1])
 
     times, end = found.elapsed.values, 1.0 / SPEED
-    seen, states, state, start = np.zeros(times.size), [], np.zeros(6), 0.0
+    seen, state, start = np.zeros(times.size), np.zeros(6), 0.0
     for stop in (0.2, 0.4, end, end + 0.2, end + 0.4):
         own = (times >= start) & (times < stop)
         part = solve_ivp(rates, (start + 1e-12, stop - 1e-12), state, rtol=1e-10, atol=1e-13, dense_output=True).sol
         seen[own] = shape(0.5) @ part(times[own])[:2]
-        states.append(state)
         state, start = part(stop), stop
     within = times < end + 0.4
     assert np.abs(found.midspan.values - seen)[within].max() < 2e-5 * np.abs(seen).max()
