@@ -119,13 +119,13 @@ class Choice(NamedTuple):
 
 
 def choices(dataset: xr.Dataset, scene: str, quantity: str) -> list[Choice]:
-    """All points of one scene and quantity that have an error, from cheap to dear."""
+    """All points of one scene and quantity that have an error and a time, from cheap to dear."""
     total = dataset["total_error"].sel(scene=scene, quantity=quantity)
     total = total.transpose("mode_count", "correction", "scheme", "step_count")
     seconds = dataset["total_seconds_per_variant"].sel(scene=scene).transpose("mode_count", "scheme", "step_count")
     worst = dependable(total.values)
     found = []
-    for m, c, i, n in np.argwhere(np.isfinite(worst)):
+    for m, c, i, n in np.argwhere(np.isfinite(worst) & np.isfinite(seconds.values[:, None])):
         scheme, steps = str(dataset["scheme"].values[i]), int(dataset["step_count"].values[n])
         modes, corrected = int(dataset["mode_count"].values[m]), bool(dataset["correction"].values[c])
         found.append(Choice(modes, corrected, scheme, steps, float(worst[m, c, i, n]), float(seconds.values[m, i, n])))
@@ -141,7 +141,7 @@ def step_choices(dataset: xr.Dataset, scene: str, quantity: str) -> list[Choice]
     schemes, steps = dataset["scheme"].values, dataset["step_count"].values
     found = [
         Choice(modes, True, str(schemes[i]), int(steps[n]), float(worst[i, n]), float(seconds[i, n]))
-        for i, n in np.argwhere(np.isfinite(worst))
+        for i, n in np.argwhere(np.isfinite(worst) & np.isfinite(seconds))
     ]
     return _sorted(found)
 

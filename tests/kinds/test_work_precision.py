@@ -231,6 +231,19 @@ def test_the_front_of_the_archive() -> None:
             best = min(best, point.error)
 
 
+def test_a_point_that_was_not_timed_is_no_choice() -> None:
+    """One that diverged with the static correction has no time, and may have an error without it."""
+    dataset = precision.small().copy(deep=True)
+    scene, quantity = dataset.scene.values[0], "history"
+    before = trade.choices(dataset, scene, quantity)
+    for place, name in enumerate(("seconds_per_variant", "total_seconds_per_variant")):
+        dataset[name].loc[{"scene": scene, "scheme": "fox-goodwin", "step_count": 640}] = np.nan
+        points = (trade.step_choices, trade.choices)[place](dataset, scene, quantity)
+        assert points == sorted(points, key=lambda point: point.seconds)
+        assert all((point.scheme, point.steps) != ("fox-goodwin", 640) for point in points)
+    assert set(points) == {point for point in before if (point.scheme, point.steps) != ("fox-goodwin", 640)}
+
+
 # ---- figures ----
 
 
