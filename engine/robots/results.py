@@ -43,6 +43,7 @@ if TYPE_CHECKING:
 DOING = {"moving": MOVES, "working": WORKS, "holding": HOLDS}
 OF_DRIVES = {"drive_force_largest": "drive force", "drive_torque_largest": "drive torque"}
 OF_TOOLS = [f"{what}_{doing}" for what in ("error", "beyond_rest") for doing in DOING]
+LARGEST = "largest "  # before the name of what has a history
 KEPT = 800  # stations of a history
 
 
@@ -77,7 +78,7 @@ def outcome(model: RobotModel, cut: Stretch, record: Record, resting: Record, st
     numbers["beyond_linear"] = beyond_linear(model, record, longest)
     return Outcome(
         numbers | tools | rails | drives,
-        np.concatenate([of_tools, of_rails, of_drives]),
+        np.concatenate([of_tools, *of_rails, of_drives, of_tools, of_rails[0]]),
         record.coordinates[:, 0, 3],
         record.robots[:, :, SEEN_PLANNED : SEEN_PLANNED + 3],
         _off(record) - zero_at,
@@ -119,7 +120,7 @@ def _tools(
     return numbers, over(np.max([one.missed for one in found.values()], axis=0), longest)
 
 
-def _rails(model: RobotModel, steps: Steps, record: Record) -> tuple[dict[str, Array], Array]:
+def _rails(model: RobotModel, steps: Steps, record: Record) -> tuple[dict[str, Array], tuple[Array, Array]]:
     """Deflections and stresses of rails (B,), and what is missed of deflections and of stresses that are told, over
     them."""
     sunk, bodies = peaks(record.passed[:, :, PASSED_GRIPS + SUNK : PASSED : OF_GRIP], steps.stretch), model.system.body
@@ -128,7 +129,7 @@ def _rails(model: RobotModel, steps: Steps, record: Record) -> tuple[dict[str, A
     stress = peaks(np.stack(stresses, axis=1), steps.stretch)
     told = np.array([is_told(rail.bending) for rail in model.rails.values()])
     numbers = {"deflection_largest": down, "stress_largest": stress.value}
-    return numbers, np.concatenate([over(missed, down), over(stress.missed, stress.value)[told]])
+    return numbers, (over(missed, down), over(stress.missed, stress.value)[told])
 
 
 def _drives(model: RobotModel, steps: Steps, record: Record) -> tuple[dict[str, Array], Array]:
@@ -171,39 +172,64 @@ def without_values(found: Outcome) -> Outcome:
 
 
 def results_of(model: RobotModel) -> list[str]:
-    """What an error is told of, in the order of `differences`."""
-    found = [*(f"error of {name}" for name in model.robots), *(f"deflection of {name}" for name in model.rails)]
-    found += [f"stress of {name}" for name, rail in model.rails.items() if is_told(rail.bending)]
+    """What an error is told of, in the order of `differences`: over all of the time and, of what has histories, of the
+    largest values alone."""
+    moving = [*(f"error of {name}" for name in model.robots), *(f"deflection of {name}" for name in model.rails)]
+    found = moving + [f"stress of {name}" for name, rail in model.rails.items() if is_told(rail.bending)]
     some = {name: np.flatnonzero(own.any(axis=1)) for name, own in _joints(model).items()}
-    return found + [f"{OF_DRIVES[name]} of {model.robots[r]}" for name, own in some.items() for r in own]
+    found += [f"{OF_DRIVES[name]} of {model.robots[r]}" for name, own in some.items() for r in own]
+    return found + [f"{LARGEST}{name}" for name in moving]
 
 
 def are_held(results: Sequence[str]) -> Mask:
-    """(results,) what is held to the tolerance: all but drives."""
-    return np.array([not name.startswith("drive") for name in results])
+    """(results,) what is held to the tolerance: all but drives, and largest values apart from their histories."""
+    return ~are_of_drives(results) & ~are_largest(results)
+
+
+def are_of_drives(results: Sequence[str]) -> Mask:
+    """(results,) what drives exert."""
+    return np.array([name.startswith("drive") for name in results])
+
+
+def of_histories(results: Sequence[str]) -> Counts:
+    """(largest,) the places of histories, in the order of their largest values."""
+    names = list(results)
+    return np.array([names.index(name.removeprefix(LARGEST)) for name in names if name.startswith(LARGEST)])
+
+
+def are_largest(results: Sequence[str]) -> Mask:
+    """(results,) the largest values of what has histories."""
+    return np.array([name.startswith(LARGEST) for name in results])
 
 
 def differences(model: RobotModel, one: Outcome, other: Outcome) -> Array:
-    """(results,) how far two marches are apart at any station and in the largest values that are reported, over the
-    largest length of each robot's error, the largest deflection or the largest of its drives, and of stresses the
-    largest, which alone are reported; NaN where ``other`` has none, infinite where ``one`` has none."""
+    """(results,) how far two marches are apart at any station and in the largest values that are reported, and in these
+    alone, over the largest length of each robot's error, the largest deflection or the largest of its drives, and of
+    stresses the largest, which alone are reported; NaN where ``other`` has none, infinite where ``one`` has none."""
     count = len(results_of(model))
     if not (one.status.values_kept and other.status.values_kept):
         return np.full(count, np.inf if other.status.values_kept else np.nan)
-    apart = np.linalg.norm(one.error - other.error, axis=2).max(axis=0)
-    tools = [abs(one.numbers[name] - other.numbers[name]) for name in OF_TOOLS]
-    apart = np.fmax(apart, np.fmax.reduce(tools))  # what a robot never does has no number
-    size = np.linalg.norm(other.error, axis=2).max(axis=0)
+    own, finer = one.numbers, other.numbers
+    tools = [np.abs(own[name] - finer[name]) for name in OF_TOOLS]  # what a robot never does has no number
+    tools.append(np.abs(own["error_largest"] - finer["error_largest"]).max(axis=1))
+    down = np.abs(own["deflection_largest"] - finer["deflection_largest"])
+    largest = np.concatenate([np.fmax.reduce(tools), down])
     sunk, bodies = np.abs(one.sunk - other.sunk), model.system.body
-    gaps = np.array([sunk[:, bodies == b].max() for b in range(len(model.rails))])
-    gaps = np.maximum(gaps, abs(one.numbers["deflection_largest"] - other.numbers["deflection_largest"]))
+    rails = [sunk[:, bodies == b].max() for b in range(len(model.rails))]
+    moving = np.concatenate([np.linalg.norm(one.error - other.error, axis=2).max(axis=0), rails])
+    size = np.concatenate([np.linalg.norm(other.error, axis=2).max(axis=0), finer["deflection_largest"]])
     told = np.array([is_told(rail.bending) for rail in model.rails.values()])
-    largest_one, largest_other = (each.numbers["stress_largest"][told] for each in (one, other))
-    apart = np.concatenate([apart, gaps, np.abs(largest_one - largest_other)])
-    size = np.concatenate([size, other.numbers["deflection_largest"], largest_other])
+    stress, other_stress = (each["stress_largest"][told] for each in (own, finer))
     at_stations = np.abs(one.drives - other.drives).max(axis=0)
-    drives = {n: np.maximum(at_stations, abs(one.numbers[n] - other.numbers[n])) for n in OF_DRIVES}
-    return np.concatenate([over(apart, size), by_drives(model, drives, other.numbers)])
+    drives = {n: np.maximum(at_stations, abs(own[n] - finer[n])) for n in OF_DRIVES}
+    return np.concatenate(
+        [
+            over(np.maximum(moving, largest), size),
+            over(np.abs(stress - other_stress), other_stress),
+            by_drives(model, drives, finer),
+            over(largest, size),
+        ]
+    )
 
 
 def times_apart(model: RobotModel, one: Outcome, other: Outcome) -> Array:

@@ -20,6 +20,7 @@ LOOSE_PART = 0.1  # of a value: an estimated error above stands beside it
 LEAST_PART = 0.1  # of the true value, that what is reported counts as at least: beyond nothing is known
 DYNAMIC_AMPLIFICATION = "dynamic_amplification"
 OF_TOOLS = ("error_moving", "error_working", "error_holding")
+BEYOND_REST = tuple(name.replace("error", "beyond_rest") for name in OF_TOOLS)
 OF_RAILS = ("deflection_largest", "stress_largest")
 
 
@@ -57,15 +58,19 @@ def _joined(array: xr.DataArray, parts: list[xr.DataArray]) -> xr.DataArray:
     return known.reindex({others[0]: array[others[0]].values}).transpose(*array.dims)
 
 
-def absolute_errors(results: Results, name: str, sensor: str = "") -> Array:
+def absolute_errors(results: Results, name: str, sensor: str = "", told_as: str = "") -> Array:
     """The estimated error of a result, of one sensor (or robot or rail) where it is over these, in its unit and the
-    sweep's shape; NaN where none is known.
+    sweep's shape; NaN where none is known. told_as: another result than its own that is told over the same scale, as
+    the history whose largest value it is.
 
     Errors of sensors are told over their largest static value, or their own where that is larger and something pushes
     their body along its track. An archive tells the static one where it has their dynamic amplification; else their own
     largest value stands for it, which is not far from it but near a resonance.
     """
-    error, (known, reported) = results.estimated_error(_told_as(name, sensor)), _scales(results, name, sensor)
+    error, (known, reported) = (
+        results.estimated_error(told_as or _told_as(name, sensor)),
+        _scales(results, name, sensor),
+    )
     # What is reported is off itself: the true one, which errors are parts of, may be larger by as much.
     return error * np.fmax(
         results.everywhere(known), results.everywhere(reported) / np.maximum(1.0 - error, LEAST_PART)
@@ -74,9 +79,10 @@ def absolute_errors(results: Results, name: str, sensor: str = "") -> Array:
 
 def _told_as(name: str, sensor: str) -> str:
     """The name of a result among those whose errors are estimated."""
-    if name in (*OF_TOOLS, *OF_RAILS):
-        return f"{name.partition('_')[0]} of {sensor}"
-    return f"{name} {sensor}".strip()
+    if name in (*OF_TOOLS, *BEYOND_REST):
+        return f"largest error of {sensor}"
+    of_rails = {"deflection_largest": f"largest deflection of {sensor}", "stress_largest": f"stress of {sensor}"}
+    return of_rails.get(name, f"{name} {sensor}".strip())
 
 
 def errors_of_size(results: Results, sensor: str) -> Array:
@@ -103,7 +109,7 @@ def _scales(results: Results, name: str, sensor: str) -> tuple[Any, Any]:
     """What the estimated error of a result is a part of, in the result's unit: what is known, and what the variant
     reports itself; the larger one counts, NaN is none."""
     dataset, stem = results.dataset, name.rpartition("_")[0]
-    if name in OF_TOOLS:
+    if name in (*OF_TOOLS, *BEYOND_REST):
         return np.nan, _largest([results.of_sensor(one, sensor) for one in OF_TOOLS])
     if name in OF_RAILS:
         return np.nan, results.of_sensor(name, sensor)

@@ -64,9 +64,9 @@ def _in_words(results: Results, one: _Missed) -> str:
     """The result, how far it may be off, where, and when."""
     kind, name = one.name.split(" of ", 1)
     if kind == "error":
-        error, noun, units = absolute_errors(results, OF_TOOLS[0], name), f"the tool error of {name}", "m"
+        error, noun, units = absolute_errors(results, OF_TOOLS[0], name, one.name), f"the tool error of {name}", "m"
     else:
-        error = absolute_errors(results, f"{kind}_largest", name)
+        error = absolute_errors(results, f"{kind}_largest", name, one.name)
         noun, units = f"the {kind} of {name}", "Pa" if kind == "stress" else "m"
     off = quantity(float(error[one.at]), units, 2)
     when = f", most in doubt at {quantity(one.time, 's')}" if np.isfinite(one.time) else ""

@@ -6,9 +6,9 @@ from results_schema.variable import outputs
 
 RESULTS = outputs("""
     estimated_error | result | | optional nan float32 | estimated error of every result
-        largest at any time, over the largest length of a robot's error or the largest deflection of a rail; of steps,
-        of what may be larger between these, of modes and of elements; of drives over the largest force or torque of
-        the robot, held to no tolerance
+        at any time, and of the largest values alone, over the largest length of a robot's error or the largest
+        deflection of a rail; of steps, of what may be larger between these, of modes and of elements; of drives over
+        the largest force or torque of the robot, held to no tolerance
     estimated_error_time | result | s | optional nan | time at which more modes or steps changed a result the most
         of whichever leaves the larger error, but for modes that the study fixes; NaN of stresses and drives
     steps_used | | | int32 | number of steps used

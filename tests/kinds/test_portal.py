@@ -9,7 +9,18 @@ import pytest
 
 import studies
 from engine.robots.converge import Ladder, Rung, by_fixed, converge, marched
-from engine.robots.results import OF_DRIVES, are_held, by_drives, differences, handled, results_of, works
+from engine.robots.results import (
+    OF_DRIVES,
+    are_held,
+    are_largest,
+    are_of_drives,
+    by_drives,
+    differences,
+    handled,
+    of_histories,
+    results_of,
+    works,
+)
 from engine.scene.study import Study
 from engine.scene.sweep import expand
 from results_schema.errors import BadInput
@@ -56,7 +67,7 @@ def test_a_sweep_has_every_variant_as_it_is_alone(found: Any) -> None:
 
 def test_errors_are_told_in_units_of_results(found: Any) -> None:
     """Of what tools are off over the longest of all, of deflections over their own."""
-    errors, parts = studies.errors(found), found.estimated_error.sel(result="error of portal")
+    errors, parts = studies.errors(found), found.estimated_error.sel(result="largest error of portal")
     own = errors.error_moving.sel(robot="portal")
     longest = np.fmax(found.error_moving, np.fmax(found.error_working, found.error_holding)).sel(robot="portal")
     known = own.notnull()
@@ -93,15 +104,20 @@ def test_estimated_errors_are_no_smaller_than_true_ones(modes: int | str) -> Non
         found = converge(own, None, 0.5, "start")
         whole = own.with_values({f"body.{name}.modes": 64 for name in study.body})
         finest = Ladder.of(whole, None, 0.5).level(Rung(0, found.rung.steps + 3))
-        exact, held = marched(finest, "start"), are_held(results_of(found.model))
-        true = differences(found.model, found.outcome, exact)[held]
+        exact, names = marched(finest, "start"), results_of(found.model)
+        held, drives = are_held(names), are_of_drives(names)
+        true_of_all = differences(found.model, found.outcome, exact)
+        true = true_of_all[held]
         assert (true <= found.error[held]).all() and found.status == Status.OK and (true > 1e-5).all()
+        largest = are_largest(names)
+        assert (true_of_all[largest] <= found.error[largest]).all() and (true_of_all[largest] > 0.0).all()
+        assert (found.error[largest] <= found.error[of_histories(names)]).all()
         own_ladder = Ladder.of(own, None, 0.5)
         fixed = by_fixed(own_ladder, marched(own_ladder.level(Rung(0, 0)), "start"), "start", lambda: False)
         assert modes == 6 or (found.error - fixed)[held].max() <= 1e-2  # elements are told and not held
         off = {name: np.abs(found.outcome.numbers[name] - exact.numbers[name]) for name in OF_DRIVES}
         of_drives = by_drives(found.model, off, exact.numbers)
-        assert (of_drives <= found.error[~held]).all() and (found.error[~held] < 0.15).all()
+        assert (of_drives <= found.error[drives]).all() and (found.error[drives] < 0.15).all()
         many = own.with_values({f"body.{name}.modes": 20 for name in own.body})
         fuller = marched(Ladder.of(many, None, 0.5).level(Rung(0, found.rung.steps + 3)), "start")
         assert (differences(found.model, found.outcome, fuller)[:2] < 2e-2).all()
