@@ -57,8 +57,8 @@ LEFT_BY_MODES, LEFT_BY_STEPS, ALIKE = 1.0, 0.5, 0.5
 #: The same of steps that a study fixes, which may be too long: with 0.5 one error of 1,000 steps was told 0.64 times.
 LEFT_BY_FIXED_STEPS = 1.0
 #: So many times more of what drives exert, whose largest values converge by the first power of modes and steps, blows
-#: of payloads by less: of 230 errors of 60 random scenes half were told too small with 1, a ninth with 2.
-LEFT_OF_DRIVES = 2.0
+#: of payloads by less: of 230 errors of 60 random scenes half were told too small with 1, a fifth with 2.
+LEFT_OF_DRIVES = 2.5
 MOST_ALIKE = 0.75  # ratio of two changes in a row by which the rest is told
 WORTH = 0.1  # of the tolerance: what no march is taken to be rid of
 LEAST_BETA = 1.0 / 12.0  # of Fox-Goodwin: below, the phase is worse again
@@ -127,10 +127,11 @@ class Ladder:
 
     def finer(self, rung: Rung, told: tuple[float, float]) -> Rung | None:
         """The next rung by the errors told of modes and of steps: the larger one is refined where it can be, else the
-        other, unless that is in vain. Steps go first: where these are too long, changes by modes are five times as
-        large."""
+        other, unless that is in vain. Steps go first until they hold the tolerance: where they are too long, changes by
+        modes are five times as large, and are not measured again."""
         tolerance = self.study.solver.tolerance
-        for axis in sorted((1, 0), key=lambda number: -told[number]):
+        too_long = told[1] > tolerance and rung.steps < self.most.steps
+        for axis in (1, 0) if too_long else sorted((1, 0), key=lambda number: -told[number]):
             if told[axis] <= WORTH * tolerance:
                 return None
             if rung[axis] < self.most[axis]:
@@ -241,10 +242,10 @@ def by_fixed(ladder: Ladder, first: Outcome, zero: str, halted: Callable[[], boo
 
 
 def alike(apart: Array, names: Sequence[str]) -> Array:
-    """(results,) changes of a march, those of what is held, of largest values and of drives raised to a part of the
-    largest of these."""
+    """(results,) changes of a march, those of what is held and of largest values raised to a part of the largest of
+    these."""
     raised = apart.copy()
-    for own in (are_held(names), are_largest(names), are_of_drives(names)):
+    for own in (are_held(names), are_largest(names)):
         raised[own] = np.maximum(apart[own], ALIKE * apart[own].max())
     return raised
 

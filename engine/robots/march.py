@@ -8,25 +8,66 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from engine.kernels.layout import SOUND, Newmark
-from engine.kernels.robots.layout import FALLS_OVER, OBSERVED, OF_GRIP, PASSED, START, WHOLE, Record, Stretch
+from engine.kernels.robots.layout import (
+    FALLS_OVER,
+    HOLDS,
+    MOVES,
+    OBSERVED,
+    OF_GRIP,
+    PASSED,
+    START,
+    STEADY,
+    UP,
+    WHOLE,
+    WORKS,
+    Record,
+    Stretch,
+)
 from engine.kernels.robots.march import march as march_kernel
 from engine.kernels.robots.march import rest as rest_kernel
+from results_schema.arrays import Array, Counts
 from results_schema.status import Status
 
 if TYPE_CHECKING:
     from engine.robots.model import RobotModel
 
+SAME = 1e-9  # of the whole time: closer events are one
 NEWTON = 1e-4  # of the tolerance: what is left of a step's corrections, over the largest motion
 
 
 def stretches(model: RobotModel, duration: float, step: float, every: int) -> Stretch:
-    """The time (s) cut at the beginnings of moves, into steps no longer than ``step`` (s) of which ``every`` th is
-    observed; the same events and stations whatever ``every`` is where step/every stays."""
-    starts = model.system.moves[:, :, START]
-    events = np.unique(np.concatenate([[0.0], starts[starts < duration]]))
+    """The time (s) cut where a robot begins or ends a move or its work, into steps no longer than ``step`` (s) of which
+    ``every`` th is observed; the same events and stations whatever ``every`` is where step/every stays."""
+    events = _events(model, duration)
     lengths = np.diff([*events, duration])
     steps = np.maximum(1, np.ceil(lengths / (step * every) - 1e-9)).astype(np.int64) * every
     return Stretch(events, lengths / steps, steps, every, (NEWTON * model.study.solver.tolerance) ** 2)
+
+
+def _events(model: RobotModel, duration: float) -> Array:
+    """s: time 0 and when moves begin or end, or work ends, without ends at which another begins."""
+    moves, until = model.system.moves, model.system.stays[:, 1:, -1]
+    starts = np.unique(np.concatenate([[0.0], moves[:, :, START].ravel()]))
+    arrivals = moves[:, :, START] + 2.0 * moves[:, :, UP] + moves[:, :, STEADY]
+    ends = np.sort(np.concatenate([arrivals[np.isfinite(arrivals)], until[np.isfinite(until)]]))
+    ends = ends[np.diff(ends, append=np.inf) > SAME * duration]
+    apart = np.abs(ends[:, None] - starts[np.isfinite(starts)]).min(axis=1) > SAME * duration
+    events = np.concatenate([starts, ends[apart]])
+    return np.sort(events[events < duration * (1.0 - SAME)])
+
+
+def doing(model: RobotModel, cut: Stretch) -> Counts:
+    """(P, R) what robots do in each stretch of time: MOVES, WORKS or HOLDS."""
+    moves, stays = model.system.moves, model.system.stays
+    middle = cut.start + 0.5 * cut.step * cut.steps
+    found = np.full((middle.size, len(moves)), HOLDS)
+    for r, own in enumerate(moves):
+        begun = np.searchsorted(own[:, START], middle)  # moves that are none begin at infinity
+        lengths = np.append(0.0, 2.0 * own[:, UP] + own[:, STEADY])[begun]
+        since = middle - np.append(-np.inf, own[:, START])[begun]
+        found[middle <= stays[r, begun, -1], r] = WORKS
+        found[since < lengths, r] = MOVES
+    return found
 
 
 def march(model: RobotModel, times: Stretch, scheme: Newmark) -> tuple[Record, Status]:

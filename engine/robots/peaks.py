@@ -45,11 +45,8 @@ class Peaks(NamedTuple):
 
 
 def peaks(values: Array, stretch: Counts, among: Mask | None = None) -> Peaks:
-    """The largest of values (T, ...) at equal steps of each stretch (T,), or of those ``among`` them: that of a
-    parabola through three of them, of which the middle one is the largest.
-
-    What that adds to the largest step is told as missed; where others than these begin or end within a stretch, what
-    the value beyond is larger, since the change is somewhere between.
+    """The largest of values (T, ...) at equal steps of each stretch (T,), or of the stretches ``among`` them: that of a
+    parabola through three of them, of which the middle one is the largest. What that adds is told as missed.
 
     >>> t = np.linspace(0.0, 3.0, 8)
     >>> found = peaks(np.sin(t), np.zeros(8, dtype=int))

@@ -19,7 +19,6 @@ from engine.kernels.robots.layout import (
     OFF,
     PASSED,
     PASSED_GRIPS,
-    PASSED_PHASE,
     SEEN_ACTUAL,
     SEEN_PLANNED,
     SLIDES,
@@ -30,6 +29,7 @@ from engine.kernels.robots.layout import (
     VERTICAL,
     WORKS,
 )
+from engine.robots.march import doing
 from engine.robots.peaks import Steps, peaks
 from engine.robots.shortening import beyond_linear
 from engine.robots.stress import is_told, stress_at_steps
@@ -69,7 +69,7 @@ def outcome(model: RobotModel, cut: Stretch, record: Record, resting: Record, st
     "start" (what they are at time 0) or "unloaded" rails."""
     steps, at_start = Steps.of(cut), _off(record)[0].copy()
     zero_at = at_start if zero == "start" else np.zeros_like(at_start)
-    tools, of_tools = _tools(record, resting, steps, zero_at, model.study.solver.tolerance)
+    tools, of_tools = _tools(model, record, resting, steps, doing(model, cut)[steps.stretch], zero_at)
     rails, of_rails = _rails(model, steps, record)
     longest = np.fmax.reduce([tools[f"error_{doing}"] for doing in DOING])
     pressed = peaks(record.passed[:, :, PASSED_GRIPS + VERTICAL : PASSED : OF_GRIP], steps.stretch).value.max(axis=1)
@@ -96,7 +96,7 @@ def _off(record: Record) -> Array:
 
 
 def _tools(
-    record: Record, resting: Record, steps: Steps, zero_at: Array, tolerance: float
+    model: RobotModel, record: Record, resting: Record, steps: Steps, done: Counts, zero_at: Array
 ) -> tuple[dict[str, Array], Array]:
     """The numbers of tools, and what is missed of them (R,) over the longest error: what they are off, what they are
     off from where they would rest, and for which part of the time that is within a tolerance of the longest error."""
@@ -106,12 +106,12 @@ def _tools(
         "beyond_rest": np.linalg.norm(off - steps.between_stations(_off(resting)), axis=2),
     }
     found = {
-        f"{name}_{doing}": peaks(size, steps.stretch, record.passed[:, :, PASSED_PHASE] == phase)
+        f"{name}_{doing}": peaks(size, steps.stretch, done == phase)
         for name, size in sizes.items()
         for doing, phase in DOING.items()
     }
     longest = sizes["error"].max(axis=0)
-    close = sizes["beyond_rest"] <= tolerance * longest
+    close = sizes["beyond_rest"] <= model.study.solver.tolerance * longest
     numbers = {name: one.value for name, one in found.items()} | {
         "error_largest": peaks(np.abs(off - zero_at), steps.stretch).value,
         "error_largest_time": steps.times[np.argmax(sizes["error"], axis=0)],

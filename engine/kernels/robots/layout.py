@@ -145,11 +145,11 @@ class Record(NamedTuple):
     bent: FloatArray
 
 
-# columns of Record.robots: planned and actual tool centre point (m), wrench that carries the base about its point, what
-# the robot does; of Record.grips: of that wrench what each rail carries about its axis, m by which the rail is down,
-# and the place along it (m)
-SEEN_PLANNED, SEEN_ACTUAL, SEEN_WRENCH, SEEN_PHASE, OBSERVED = 0, 3, 6, 12, 13
+# columns of Record.robots: planned and actual tool centre point (m), wrench that carries the base about its point; of
+# Record.grips: of that wrench what each rail carries about its axis, m by which the rail is down, and the place along
+# it (m)
+SEEN_PLANNED, SEEN_ACTUAL, SEEN_WRENCH, OBSERVED = 0, 3, 6, 12
 VERTICAL, SUNK, ALONG, OF_GRIP = 2, 6, 7, 8
-# columns of Record.passed: actual less planned tool centre point (m), what the robot does, what `grips` has of both
-# rails; then what each of J drives exerts
-OFF, PASSED_PHASE, PASSED_GRIPS, PASSED = 0, 3, 4, 4 + 2 * OF_GRIP
+# columns of Record.passed: actual less planned tool centre point (m), what `grips` has of both rails; then what each of
+# J drives exerts
+OFF, PASSED_GRIPS, PASSED = 0, 3, 3 + 2 * OF_GRIP

@@ -29,7 +29,6 @@ from engine.kernels.robots.layout import (
     OFF,
     PASSED,
     PASSED_GRIPS,
-    PASSED_PHASE,
     PAYLOAD,
     PHASE,
     PLACE,
@@ -38,7 +37,6 @@ from engine.kernels.robots.layout import (
     PUSH,
     RATE,
     SEEN_ACTUAL,
-    SEEN_PHASE,
     SEEN_PLANNED,
     SEEN_WRENCH,
     SOFT,
@@ -310,7 +308,6 @@ def observe(system, t, state, work, left, record, station):
             record.coordinates[station, k, order] = state[k, order]
     for r in range(work.robots.shape[0]):
         seen, robot = record.robots[station, r], work.robots[r]
-        seen[SEEN_PHASE] = work.doing[r, PHASE]
         for j in range(system.counts[r, JOINTS]):
             record.drive[station, r, j] = work.links[r, j, DRIVE]
         missing, turn = sink(system, r, work, record.grips[station, r])
@@ -332,7 +329,6 @@ def pass_by(state, record, station, passed):
         own, seen, grips = record.passed[passed, r], record.robots[station, r], record.grips[station, r]
         for k in range(3):
             own[OFF + k] = seen[SEEN_ACTUAL + k] - seen[SEEN_PLANNED + k]
-        own[PASSED_PHASE] = seen[SEEN_PHASE]
         for g in range(2):
             for k in range(OF_GRIP):
                 own[PASSED_GRIPS + OF_GRIP * g + k] = grips[g, k]
