@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import accumulate
 from typing import Annotated, Any, ClassVar, Literal, TypeVar
@@ -15,7 +15,18 @@ from engine.scene.motions.base import Motion
 from engine.study_file.document import Document
 from engine.study_file.refusals import refuse
 from engine.study_file.spec import LIKE_OSCILLATORS, LIST, NUMBER, KindOf, Noun, Spec, by_amount_form
-from engine.study_file.units import Damping, Dimensionless, Force, Length, Mass, Stiffness, Time, fault
+from engine.study_file.units import (
+    Angle,
+    Damping,
+    Dimensionless,
+    Force,
+    Frequency,
+    Length,
+    Mass,
+    Stiffness,
+    Time,
+    fault,
+)
 from results_schema.arrays import Array
 
 MAX_AXLES = 200
@@ -115,14 +126,17 @@ class Train(Spec):
 
     def own(self, key: str) -> tuple[float, ...]:
         """A number of every axle, before the scales."""
-        value = getattr(self, key)
+        return self.each_of(getattr(self, key))
+
+    def each_of(self, value: float | tuple[float, ...]) -> tuple[float, ...]:
+        """One number for all axles, or a list with one for each, as such a list."""
         return value if isinstance(value, tuple) else (value,) * self.count
 
     def scale(self, key: str) -> float:
         """The factor of a number of the axles."""
         return self.load_scale if key in self.loads else 1.0
 
-    def numbers(self, axle: int) -> dict[str, float]:
+    def numbers(self, axle: int) -> dict[str, Any]:
         """What an axle has of its own, counted from 0, by the keys of carriages."""
         found = {key: self.own(key)[axle] * self.scale(key) for key in self.each}
         if self.delay is not None:
@@ -157,6 +171,13 @@ class Train(Spec):
         elif first in self.each:
             yield from ((axle, first, self.scale(first)) for axle in ([int(rest)] if rest else axles))
 
+    def agree(self, key: str, each: Sequence[float]) -> None:
+        """That a list has a number for each axle. Raises."""
+        if len(each) != self.count:
+            what = f"{key} is one number for all axles, or a list with one for each"
+            received = f"a list of {len(each)} number{'s' * (len(each) != 1)}"
+            raise fault(what, expected=f"{self.count} numbers, or one without brackets", received=received)
+
     @model_validator(mode="after")
     def _axles_agree(self) -> Train:
         listed = isinstance(self.spacing, tuple)
@@ -166,11 +187,7 @@ class Train(Spec):
             expected = f"axles = {self.count}, or without this key"
             raise fault("spacings lie between axles", expected=expected, received=f"axles = {self.axles}")
         for key in self.each:
-            if len(self.own(key)) != self.count:
-                count = len(self.own(key))
-                what = f"{key} is one number for all axles, or a list with one for each"
-                received = f"a list of {count} number{'s' * (count != 1)}"
-                raise fault(what, expected=f"{self.count} numbers, or one without brackets", received=received)
+            self.agree(key, self.own(key))
         last = min(self.ends(self.count - 1).values(), default=0.0)
         if last < 0.0:
             what = "the last axle is off the body at an end of its way, where only a cruise comes onto it"
@@ -180,13 +197,52 @@ class Train(Spec):
         return self
 
 
+class Pulsations(Spec):
+    """What forces in a row swing by, as a force alone does: at one frequency (Hz), by amplitudes (N) and from phases
+    (rad) that are the same for all or listed for each from the front."""
+
+    amplitude: OneOrEach[Force]
+    frequency: Frequency = Field(gt=0)
+    phase: OneOrEach[Angle] = 0.0
+
+
 class ForceTrain(Train):
-    """Constant forces in N along gravity."""
+    """Forces in N along gravity, with what they swing by, as of persons one behind another."""
 
     units = "N"
     loads = ("force",)
     kind: Literal["force"]
     force: OneOrEach[Force]
+    pulsation: Pulsations | None = None
+
+    def numbers(self, axle: int) -> dict[str, Any]:
+        return super().numbers(axle) | ({"pulsation": pulses[axle]} if (pulses := self._pulses) else {})
+
+    def follow(self, key: str) -> Iterator[tuple[int, str, float]]:
+        yield from super().follow(key)
+        first, _, rest = key.partition(".")
+        number, _, place = rest.partition(".")
+        if key == "load_scale" and self.pulsation is not None:
+            amplitudes = self.each_of(self.pulsation.amplitude)
+            yield from ((axle, "pulsation.amplitude", own) for axle, own in enumerate(amplitudes) if own)
+        elif first == "pulsation":
+            scale = self.load_scale if number == "amplitude" else 1.0
+            yield from ((axle, f"pulsation.{number}", scale) for axle in ([int(place)] if place else range(self.count)))
+
+    @property
+    def _pulses(self) -> list[dict[str, float]]:
+        """What every force swings by, by the keys of carriages; none where none does."""
+        if self.pulsation is None:
+            return []
+        numbers = {key: self.each_of(getattr(self.pulsation, key)) for key in Pulsations.model_fields}
+        each = [dict(zip(numbers, own, strict=True)) for own in zip(*numbers.values(), strict=True)]
+        return [own | {"amplitude": own["amplitude"] * self.load_scale} for own in each]
+
+    @model_validator(mode="after")
+    def _pulsations_agree(self) -> ForceTrain:
+        for key in ("amplitude", "phase") if self.pulsation is not None else ():
+            self.agree(f"pulsation.{key}", self.each_of(getattr(self.pulsation, key)))
+        return self
 
 
 class MassTrain(Train):
@@ -195,6 +251,7 @@ class MassTrain(Train):
     loads = ("mass",)
     unsprung = "mass"
     kind: Literal["mass"]
+    bilateral: bool = False
     mass: OneOrEach[Annotated[Mass, Field(gt=0)]]
     inertia_along: bool = False
     inertia_across: bool = False
@@ -208,6 +265,7 @@ class OscillatorTrain(Train):
     unsprung = "wheel_mass"
     springs = ("stiffness", "damping")
     kind: Literal["oscillator"]
+    bilateral: bool = False
     mass: OneOrEach[Annotated[Mass, Field(gt=0)]]
     wheel_mass: OneOrEach[Annotated[Mass, Field(ge=0)]] = 0.0
     stiffness: OneOrEach[Annotated[Stiffness, Field(gt=0)]]

@@ -239,8 +239,9 @@ def told_pulsation(results: Results, place: Index) -> str:
                 for value in (results.parameter(key), first_omega(results) / (2.0 * np.pi))
             )
             if abs(pulse - own) <= NEAR * own:
+                who = f"train {train}" if (train := results.study.axles.get(name)) else name
                 first = f"the first frequency of {carriage.on} ({number(own)} Hz)"
-                return f" Where it is largest {name} pulsates in step with {first}."
+                return f" Where it is largest {who} pulsates in step with {first}."
     return ""
 
 
