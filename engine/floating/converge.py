@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice
 from typing import TYPE_CHECKING
@@ -16,7 +16,7 @@ from engine.floating.model import build
 from engine.floating.results import Outcome, Result, differences, outcome, results_of
 from engine.floating.schemes import USUAL, scheme_of, weights_of
 from engine.floating.settling import tell_times
-from engine.march.stepper import Halted
+from engine.march.halting import stop_if_asked
 from results_schema.arrays import Array, Counts
 from results_schema.gravest_status import gravest, lost
 from results_schema.status import Fidelity, Status
@@ -107,7 +107,6 @@ def converge(
     duration: Array,
     longest: float,
     rung: Rung,
-    halted: Callable[[], bool] = lambda: False,
 ) -> Converged:
     """March variants of one scene level by level; duration (V,) s, the longest of all variants of the scene, and its
     model. Where the study fixes the steps, these are marched, and twice as many to tell the error. Raises Halted."""
@@ -115,8 +114,7 @@ def converge(
     found: Outcome | None = None
     active = np.arange(V)
     for level in islice(levels(study, longest, rung.modes), LEVELS if study.solver.steps == "auto" else 2):
-        if halted():
-            raise Halted
+        stop_if_asked()
         model, own = level.model, values.part(active)
         now = level.march(own, duration[active], rung.fidelity)
         if found is None:
@@ -159,17 +157,15 @@ def observed(
     duration: Array,
     longest: float,
     rung: Rung,
-    halted: Callable[[], bool] = lambda: False,
 ) -> tuple[Array, Array]:
     """What `converge` reports beside one level beyond that of each variant: how far results are off, and the errors
     told of them (R, V); NaN where there is no such level, or no values. The level beyond has the floating frame, and
     more modes where these are open. Raises Halted."""
-    found = converge(study, values, duration, longest, rung, halted)
+    found = converge(study, values, duration, longest, rung)
     apart, left = np.full_like(found.error, np.nan), ~lost(found.status)
     for level in levels(rung.of(study), longest, MORE_MODES * rung.modes):
         lanes = np.flatnonzero(left & (found.steps < level.steps))
-        if halted():
-            raise Halted
+        stop_if_asked()
         if lanes.size:
             beyond = level.march(values.part(lanes), duration[lanes])
             apart[:, lanes] = differences(level.model, found.outcome.of(lanes), beyond)

@@ -14,6 +14,7 @@ from engine.kernels.floating.layout import Lane, Record, Weights
 from engine.kernels.floating.march import march as march_lanes
 from engine.kernels.floating.observe import BODY_ATTITUDE, CONTACT_FORCE, OF_BODY, OF_CARRIAGE
 from engine.kernels.layout import LANES
+from engine.march.halting import flagged
 from results_schema.arrays import Array, Counts, Mask
 from results_schema.gravest_status import gravest
 from results_schema.status import Fidelity, Status
@@ -53,7 +54,7 @@ def march(
     fidelity: Fidelity = Fidelity.FRAME,
 ) -> Marched:
     """March variants for a duration (V,) s in so many steps, with signals kept at stations (ascending); fidelity: what
-    `engine.floating.model_choice` chose."""
+    `engine.floating.model_choice` chose. Raises Halted."""
     V, h = values.size, duration / steps
     table = lanes(model, values, h)
     in_lanes = Lane(*map(in_blocks, table))
@@ -65,7 +66,8 @@ def march(
     system = model.system._replace(given=fidelity == Fidelity.GIVEN_FRAME)
     settled = np.full((shape[0], *system.bands.shape, LANES), -np.inf)
     kept = statistics, history, settled, codes, last
-    march_lanes(system, in_lanes, scheme, steps, Record(np.asarray(stations), *kept))
+    with flagged() as stop:
+        march_lanes(system, in_lanes, scheme, steps, Record(np.asarray(stations), *kept, stop))
     statistics, history, settled, codes, last = (out_of_blocks(part, V) for part in kept)
     first = model.signal_of("carriages") + CONTACT_FORCE
     pulls = statistics[:, first : model.signal_of("ends") : OF_CARRIAGE, layout.SMALLEST] < 0.0

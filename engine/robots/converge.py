@@ -3,7 +3,7 @@ they report stays where it is."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
@@ -13,7 +13,7 @@ import numpy as np
 from engine.accuracy.reference import LEFT_BY_ELEMENTS
 from engine.kernels.layout import Newmark
 from engine.kernels.schemes import SCHEMES, NewmarkScheme
-from engine.march.stepper import Halted
+from engine.march.halting import stop_if_asked
 from engine.robots.march import march, rest, stretches
 from engine.robots.model import build
 from engine.robots.modes import (
@@ -175,15 +175,13 @@ def scheme_of(study: Study) -> NewmarkScheme:
     )
 
 
-def converge(
-    study: Study, duration: float | None, after: float, zero: str, halted: Callable[[], bool] = lambda: False
-) -> Converged:
+def converge(study: Study, duration: float | None, after: float, zero: str) -> Converged:
     """March a study without sweep level by level, for a duration (s), or until all is done and some time ``after``.
     Raises Halted."""
-    return climb(Ladder.of(study, duration, after), zero, halted)
+    return climb(Ladder.of(study, duration, after), zero)
 
 
-def climb(ladder: Ladder, zero: str, halted: Callable[[], bool] = lambda: False) -> Converged:
+def climb(ladder: Ladder, zero: str) -> Converged:
     """March rung by rung until what is held stays. Raises Halted."""
     rung = Rung(0, 0)
     tolerance = ladder.study.solver.tolerance
@@ -205,8 +203,7 @@ def climb(ladder: Ladder, zero: str, halted: Callable[[], bool] = lambda: False)
         finer = ladder.finer(rung, (by_modes if now.status.values_kept else 0.0, by_steps))
         if finer is None:
             break
-        if halted():
-            raise Halted
+        stop_if_asked()
         axis, before, level = int(finer.steps > rung.steps), now, ladder.level(finer)
         now = marched(level, zero)
         apart = alike(differences(level.model, before, now), names)
@@ -220,17 +217,16 @@ def climb(ladder: Ladder, zero: str, halted: Callable[[], bool] = lambda: False)
         judged = Status.OK if error[held].max() <= tolerance else Status.TOLERANCE_MISSED
     whole = Status(int(gravest(Status(int(gravest(judged, now.status))), ladder.resting[1])))
     reported, times = now if whole.values_kept else without_values(now), np.where(told[0] > told[1], *when)
-    error = error + by_fixed(ladder, first, zero, halted)
+    error = error + by_fixed(ladder, first, zero)
     largest = are_largest(names)
     error[largest] = np.minimum(error[largest], error[of_histories(names)])
     return Converged(level.model, reported, error, times, int(level.times.steps.sum()), rung, whole)
 
 
-def by_fixed(ladder: Ladder, first: Outcome, zero: str, halted: Callable[[], bool]) -> Array:
+def by_fixed(ladder: Ladder, first: Outcome, zero: str) -> Array:
     """(results,) the error by what a study fixes of its rails, at the ``first`` rung: what twice the elements, and
     twice the modes where it fixes these, change, and what the modes miss. Raises Halted."""
-    if halted():
-        raise Halted
+    stop_if_asked()
     study = with_finer_bodies(ladder.study)
     finer = replace(ladder, study=study, coarsest=build(with_open_modes(study, ladder.times * MODES[0])))
     level = finer.level(Rung(0, 0))
@@ -251,16 +247,15 @@ def alike(apart: Array, names: Sequence[str]) -> Array:
 
 
 def by_mode_counts(
-    study: Study, counts: Sequence[int], duration: float | None, after: float, zero: str, halted: Callable[[], bool]
+    study: Study, counts: Sequence[int], duration: float | None, after: float, zero: str
 ) -> tuple[Array, Array]:
     """(C, R) by how much so many modes of every rail change the errors of tools from what `converge` finds, over the
     longest of each, and (R,) what is told of that. Raises Halted."""
     ladder = Ladder.of(study, duration, after)
-    found, robots = climb(ladder, zero, halted), len(study.robot)
+    found, robots = climb(ladder, zero), len(study.robot)
     rows = []
     for count in counts:
-        if halted():
-            raise Halted
+        stop_if_asked()
         fixed = replace(ladder, coarsest=build(with_modes(study, count))).level(Rung(0, found.rung.steps))
         rows.append(differences(found.model, marched(fixed, zero), found.outcome)[:robots])
     return np.stack(rows), found.error[:robots]
@@ -281,13 +276,11 @@ def marched(level: Level, zero: str) -> Outcome:
     return outcome(level.model, level.times, record, level.resting, status, zero)
 
 
-def observed(
-    study: Study, duration: float | None, after: float, zero: str, halted: Callable[[], bool] = lambda: False
-) -> tuple[Array, Array] | None:
+def observed(study: Study, duration: float | None, after: float, zero: str) -> tuple[Array, Array] | None:
     """What a study without sweep reports, beside one level beyond: how far each result (results,) is off, and the error
     told of it; None where there are no values. Raises Halted."""
     ladder = Ladder.of(study, duration, after)
-    found = climb(ladder, zero, halted)
+    found = climb(ladder, zero)
     if not found.status.values_kept:
         return None
     beyond = ladder.level(Rung(found.rung.modes + ladder.most.modes, found.rung.steps + 1))

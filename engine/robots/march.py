@@ -25,6 +25,7 @@ from engine.kernels.robots.layout import (
 )
 from engine.kernels.robots.march import march as march_kernel
 from engine.kernels.robots.march import rest as rest_kernel
+from engine.march.halting import flagged
 from results_schema.arrays import Array, Counts
 from results_schema.status import Status
 
@@ -71,19 +72,23 @@ def doing(model: RobotModel, cut: Stretch) -> Counts:
 
 
 def march(model: RobotModel, times: Stretch, scheme: Newmark) -> tuple[Record, Status]:
-    """What robots and rails do over all stretches of time."""
-    record = _empty(model, times, int(np.sum(1 + times.steps)))
-    return record, _status(march_kernel(model.system, times, scheme, record))
+    """What robots and rails do over all stretches of time. Raises Halted."""
+    with flagged() as stop:
+        record = _empty(model, times, int(np.sum(1 + times.steps)), stop)
+        return record, _status(march_kernel(model.system, times, scheme, record))
 
 
 def rest(model: RobotModel, times: Stretch) -> tuple[Record, Status]:
-    """Where robots and rails would rest at the same stations, with joints held where they are told to be then."""
-    record, counts = _empty(model, times, 0), model.system.counts.copy()
+    """Where robots and rails would rest at the same stations, with joints held where they are told to be then. Raises
+    Halted."""
+    counts = model.system.counts.copy()
     counts[:, WHOLE] = 0
-    return record, _status(rest_kernel(model.system._replace(counts=counts), times, record))
+    with flagged() as stop:
+        record = _empty(model, times, 0, stop)
+        return record, _status(rest_kernel(model.system._replace(counts=counts), times, record))
 
 
-def _empty(model: RobotModel, times: Stretch, passed: int) -> Record:
+def _empty(model: RobotModel, times: Stretch, passed: int, stop: Counts) -> Record:
     S = int(np.sum(1 + times.steps // times.every))
     (R, J), N = model.system.coordinate.shape, len(model.system.springs)
     return Record(
@@ -93,6 +98,7 @@ def _empty(model: RobotModel, times: Stretch, passed: int) -> Record:
         np.zeros((S, R, 2, OF_GRIP)),
         np.full((passed, R, PASSED + J), math.nan),
         np.full((passed, model.modes), math.nan),
+        stop,
     )
 
 

@@ -146,9 +146,11 @@ def _march(
     from engine.floating.converge import converge
     from engine.floating.model import build
     from engine.kernels.layout import LANES
+    from engine.march.halting import stoppable
     from engine.scene.variants import VariantValues
 
-    study, rung = scene.study, _rung(scene, cases, duration, longest)
+    with stoppable(work.halted):
+        study, rung = scene.study, _rung(scene, cases, duration, longest)
     model = build(study, 2)
     kept = shown(study, cases.size)
     found: dict[int, dict[str, NDArray[Any]]] = {}
@@ -158,7 +160,8 @@ def _march(
         own = variants[first : first + at_once]
         columns = cases.columns_of(own)
         values = VariantValues(study, columns, own.size)
-        converged = converge(study, values, duration(columns, own.size), longest, rung, work.halted)
+        with stoppable(work.halted):
+            converged = converge(study, values, duration(columns, own.size), longest, rung)
         found[first] = _arrays(model, converged, np.flatnonzero(np.isin(own, kept)), own)
 
     run_jobs([partial(job, first) for first in range(0, variants.size, at_once)], work.threads)
@@ -184,6 +187,7 @@ def again(
     """Observed and told errors of some variants, scene by scene on threads."""
     from engine.batch.executors import run_jobs
     from engine.floating.converge import observed
+    from engine.march.halting import stoppable
     from engine.scene.sweep import expand
     from engine.scene.variants import VariantValues
 
@@ -194,8 +198,9 @@ def again(
         longest = float(duration(cases.columns_of(scene.variants), scene.variants.size).max())
         columns = cases.columns_of(own)
         values = VariantValues(scene.study, columns, own.size)
-        rung = _rung(scene, cases, duration, longest)
-        apart, told = observed(scene.study, values, duration(columns, own.size), longest, rung, work.halted)
+        with stoppable(work.halted):
+            rung = _rung(scene, cases, duration, longest)
+            apart, told = observed(scene.study, values, duration(columns, own.size), longest, rung)
         for lane, variant in enumerate(own.tolist()):
             known = bool(np.isfinite(apart[:, lane]).any())
             found[variant] = (apart[:, lane], told[:, lane]) if known else None

@@ -60,9 +60,11 @@ def pieces(study: Study, question: Question) -> list[Piece]:
 
 
 def _converged(study: Study, question: Question, work: Work) -> Converged:
+    from engine.march.halting import stoppable
     from engine.robots.converge import converge
 
-    return converge(study, question.duration, question.after, question.zero, work.halted)
+    with stoppable(work.halted):
+        return converge(study, question.duration, question.after, question.zero)
 
 
 def _march(study: Study, question: Question, cases: Cases, variants: Counts, work: Work) -> xr.Dataset:
@@ -89,6 +91,7 @@ def _march(study: Study, question: Question, cases: Cases, variants: Counts, wor
 def again(study: Study, question: Question, variants: Counts, work: Work) -> dict[int, tuple[Array, Array] | None]:
     """Observed and told errors of some variants, on threads."""
     from engine.batch.executors import run_jobs
+    from engine.march.halting import stoppable
     from engine.robots.converge import observed
     from engine.scene.sweep import expand
 
@@ -96,7 +99,8 @@ def again(study: Study, question: Question, variants: Counts, work: Work) -> dic
 
     def job(variant: int) -> None:
         own = cases.study_of(study, variant)
-        found[variant] = observed(own, question.duration, question.after, question.zero, work.halted)
+        with stoppable(work.halted):
+            found[variant] = observed(own, question.duration, question.after, question.zero)
 
     run_jobs([partial(job, int(variant)) for variant in variants], work.threads)
     return found
@@ -145,10 +149,12 @@ def _without(study: Study, question: Question, work: Work) -> xr.Dataset:
 
 def _by_modes(study: Study, question: Question, work: Work) -> xr.Dataset:
     """What numbers of modes change."""
+    from engine.march.halting import stoppable
     from engine.robots.converge import by_mode_counts
 
     counts, how = question.mode_counts, (question.duration, question.after, question.zero)
-    error, doubt = by_mode_counts(study, counts, *how, work.halted)
+    with stoppable(work.halted):
+        error, doubt = by_mode_counts(study, counts, *how)
     return unlabelled({"error_by_modes": error, "error_by_modes_doubt": doubt})
 
 

@@ -69,6 +69,7 @@ def foreseen(study: Study, question: Question, threads: int, audited: int) -> Fo
     """What a run takes, by some of its variants, which are marched as it does."""
     from engine.batch.executors import run_jobs
     from engine.bodies.modal.description import MAX_MODES
+    from engine.march.halting import stoppable
     from engine.robots.converge import Ladder, climb, converge
     from engine.robots.modes import MODES, open_bodies
     from engine.scene.sweep import expand
@@ -84,9 +85,8 @@ def foreseen(study: Study, question: Question, threads: int, audited: int) -> Fo
         own = cases.study_of(study, variant)
         late = begun + PATIENCE
         try:
-            found[variant] = converge(
-                own, question.duration, question.after, question.zero, lambda: time.perf_counter() > late
-            )
+            with stoppable(lambda: time.perf_counter() > late):
+                found[variant] = converge(own, question.duration, question.after, question.zero)
         except Halted:
             return
 

@@ -92,7 +92,7 @@ def left(module: ModuleType, model: FloatingModel, scheme: Weights, small: float
     table = lanes(model, VariantValues(model.study, {}, 1), np.full(1, STEP))
     lane = Lane(*(in_blocks(part)[0] for part in table))
     blank = np.zeros((1, 1, STATISTICS, LANES))
-    state, solver, *_ = march.room_to_march(model.system, lane, Record(np.zeros(1), *[blank] * 5))
+    state, solver, *_ = march.room_to_march(model.system, lane, Record(np.zeros(1), *[blank] * 6))
     work, rng = solver.work, np.random.default_rng(5)
     motions_at(lane.motions, np.full(LANES, AT), np.full(LANES, AT), work.piece, work.motions)
     for k, part in enumerate((state.now.y, state.now.u, state.now.a, state.inner)):

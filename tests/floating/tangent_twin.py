@@ -37,7 +37,7 @@ def both(model: FloatingModel, *modules: ModuleType) -> tuple[list[np.ndarray], 
     table = lanes(model, VariantValues(model.study, {}, 1), np.full(1, STEP))
     lane, N = Lane(*(in_blocks(part)[0] for part in table)), model.size
     blank = np.zeros((1, 1, STATISTICS, LANES))
-    state, solver, *_ = march.room_to_march(model.system, lane, Record(np.zeros(1), *[blank] * 5))
+    state, solver, *_ = march.room_to_march(model.system, lane, Record(np.zeros(1), *[blank] * 6))
     motions_at(lane.motions, np.zeros(LANES), np.zeros(LANES), solver.work.piece, solver.work.motions)
     for part, values in zip(state.tried, residual_twin.state(model, 1), strict=True):
         part[:] = values[:, None]

@@ -113,7 +113,7 @@ def test_estimated_errors_are_no_smaller_than_true_ones(modes: int | str) -> Non
         assert (true_of_all[largest] <= found.error[largest]).all() and (true_of_all[largest] > 0.0).all()
         assert (found.error[largest] <= found.error[of_histories(names)]).all()
         own_ladder = Ladder.of(own, None, 0.5)
-        fixed = by_fixed(own_ladder, marched(own_ladder.level(Rung(0, 0)), "start"), "start", lambda: False)
+        fixed = by_fixed(own_ladder, marched(own_ladder.level(Rung(0, 0)), "start"), "start")
         assert modes == 6 or (found.error - fixed)[held].max() <= 1e-2  # elements are told and not held
         off = {name: np.abs(found.outcome.numbers[name] - exact.numbers[name]) for name in OF_DRIVES}
         of_drives = by_drives(found.model, off, exact.numbers)

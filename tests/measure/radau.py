@@ -77,7 +77,7 @@ class Equations:
         self.lane.step[:] = self.lane.step[0, 0]
         blank = np.zeros((1, 1, STATISTICS, LANES))
         self.model, self.calls, N = model, 0, model.size
-        self.room = room_to_march(model.system, self.lane, Record(np.zeros(1), blank, blank, blank, blank))
+        self.room = room_to_march(model.system, self.lane, Record(np.zeros(1), *[blank] * 6))
         self.states, self.found = np.zeros((2, 2 * N + 6, LANES))
         start = self.lane.start[:, :, 0]
         self.start = np.concatenate([np.delete(start[0], [3, 4, 5]), np.eye(3).ravel(), start[1]])

@@ -167,7 +167,7 @@ class Record(NamedTuple):
     """What a march leaves of blocks of lanes: stations (S): ascending numbers of those whose signals are kept;
     statistics (blocks, signals, STATISTICS, LANES) of all stations, history (blocks, S, signals, LANES); settled
     (blocks, T, K, LANES): steps after which tips are within their bands for good; codes and last stations
-    (blocks, LANES)."""
+    (blocks, LANES). Where stop (1,) is not 0 it ends at once."""
 
     stations: IntArray
     statistics: FloatArray
@@ -175,3 +175,4 @@ class Record(NamedTuple):
     settled: FloatArray
     codes: IntArray
     last: IntArray
+    stop: IntArray

@@ -298,7 +298,7 @@ def march_block(system, lane, scheme, steps, block, room, record):
         if number:
             go_through(system, lane, scheme, number, state, solver)
         goes = sound(memory)
-        if everywhere(of(memory, CODE) > SOUND + 0.5):
+        if record.stop[0] != 0 or everywhere(of(memory, CODE) > SOUND + 0.5):
             break
         note_last(memory, number, block, record.last)
         watched = observe(system, lane, state.now, work, of(memory, TIME) + near_of(lane), signals)

@@ -135,7 +135,7 @@ class Pace(NamedTuple):
 class Record(NamedTuple):
     """What is observed at stations: coordinates (S, N, 4): y, y', y'' and the time;  robots (S, R, OBSERVED) and grips
     (S, R, 2, OF_GRIP): columns below;  drive (S, R, J): what drives exert. And after every step of a march: passed
-    (T, R, PASSED + J), columns below, and bent (T, n of all): y of modes."""
+    (T, R, PASSED + J), columns below, and bent (T, n of all): y of modes. Where stop (1,) is not 0 it ends at once."""
 
     coordinates: FloatArray
     robots: FloatArray
@@ -143,6 +143,7 @@ class Record(NamedTuple):
     grips: FloatArray
     passed: FloatArray
     bent: FloatArray
+    stop: IntArray
 
 
 # columns of Record.robots: planned and actual tool centre point (m), wrench that carries the base about its point; of

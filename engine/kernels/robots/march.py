@@ -76,6 +76,8 @@ def march(system, stretches, newmark, record):
             strike(system, start, state, work, left)
         begin(system, start, pace, state, work, left)
         for n in range(stretches.steps[p] + 1):
+            if record.stop[0] != 0:
+                return code
             if n > 0:
                 energy, close = step(system, start + n * h, pace, state, work, left, energy)
                 if not close:
@@ -102,6 +104,8 @@ def rest(system, stretches, record):
         load_at(system, start, work)
         for n in range(0, stretches.steps[p] + 1, stretches.every):
             t = start + n * h
+            if record.stop[0] != 0:
+                return code
             if plan_at(system, t, work):
                 hold(work)
                 code = max(code, np.int64(settle(system, stretches.close, state, work, left)))
