@@ -9,18 +9,12 @@ import numpy as np
 from engine.accuracy.grids import SceneGrid
 from engine.batch.plan import Plan
 from engine.batch.remarks_of_carriages import (
+    OF_WAYS_AND_LOADS,
     does_not_swing,
-    ends_early,
     far_apart,
-    has_no_band,
     has_unit,
     in_thousandths,
-    points_up,
-    stays_level,
-    strikes_all_modes,
     swings_slowly,
-    unreached,
-    vanishes,
 )
 from engine.bodies.modal.modal_body import ModalBody
 from engine.model.lane_table import moving_mass, weight
@@ -390,11 +384,5 @@ REMARKS: tuple[Callable[[Plan], Iterator[str]], ...] = (
     _deep,
     _thin,
     _brief_rest,
-    unreached,
-    stays_level,
-    ends_early,
-    vanishes,
-    strikes_all_modes,
-    points_up,
-    has_no_band,
+    *OF_WAYS_AND_LOADS,
 )

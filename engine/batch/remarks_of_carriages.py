@@ -102,6 +102,32 @@ def vanishes(plan: Plan) -> Iterator[str]:
             )
 
 
+def pulsates_together(plan: Plan) -> Iterator[str]:
+    """One sentence where forces that set off at times of their own pulsate in step all the same, as phases count from
+    the run's start. Axles of a train are meant to."""
+    study, swept = plan.study, {key for axis in plan.study.sweep.axes.values() for key in axis.of}
+    each = [name for name, own in study.carriage.items() if own.pulsates and name not in study.axles]
+    phases = [f"carriage.{name}.pulsation.phase" for name in each]
+    later = [name for name in each if study.carriage[name].start_time > 0.0 or f"carriage.{name}.delay" in swept]
+    if len(each) > 1 and later and not any(key in swept or study.value(key) for key in phases):
+        yield (
+            f"{' and '.join(later)} may set off later and yet in step with what else pulsates, as phases count from "
+            "the run's start: a phase of -2 pi frequency delay begins one where it sets off"
+        )
+
+
+def pulls_by_pulsation(plan: Plan) -> Iterator[str]:
+    """One sentence for every force that pulls for a part of its swing."""
+    told = set[str]()  # axles of a train have one table
+    for name, own in plan.study.carriage.items():
+        table = plan.study.source.written(f"carriage.{name}").replace(".", " ")
+        if own.pulsates and table not in told:
+            force, amplitude = (plan.study.value(f"carriage.{name}.{key}") for key in ("force", "pulsation.amplitude"))
+            if 0.0 < force < abs(amplitude):
+                told.add(table)
+                yield f"{table} pulls for a part of each swing, as its amplitude, {amplitude:.4g} N, is above its force"
+
+
 def strikes_all_modes(plan: Plan) -> Iterator[str]:
     """One sentence for every body whose accelerations are read, and which loads step onto or off where it gives way."""
     study = plan.study
@@ -223,3 +249,17 @@ def has_unit(study: Study, path: str) -> bool:
         own = None
     values = (value for part in swept or [own] for value in (part if isinstance(part, list | tuple) else [part]))
     return any(isinstance(value, str) for value in values)
+
+
+#: In the order in which they are told.
+OF_WAYS_AND_LOADS = (
+    unreached,
+    stays_level,
+    ends_early,
+    vanishes,
+    strikes_all_modes,
+    points_up,
+    has_no_band,
+    pulsates_together,
+    pulls_by_pulsation,
+)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -140,7 +141,7 @@ def _show_accuracy(outcome: Outcome, results: Results, *details: str) -> None:
     accuracy = told_accuracy(outcome.audit, results)
     paragraphs(*_about_statuses(results), *([f"Accuracy: {accuracy}"] if accuracy else []))
     paragraphs(*told_unreduced(outcome.unreduced), *details)
-    paragraphs(f"{_about_work(outcome)}. Next: wanderlast report {outcome.archive}")
+    paragraphs(f"{_about_work(outcome)}. Next: wanderlast report {shlex.quote(str(outcome.archive))}")
 
 
 def show_details(outcome: Outcome) -> None:

@@ -1,15 +1,18 @@
 """What an archive of cells of variants says: extremes of sensors and contact forces, and how many variants it is of."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from results_schema.arrays import Array, Mask
 from results_schema.status import Status
 from studies.findings.absolute_errors import LEAST_PART
 from studies.findings.beyond import LIMIT, limits_of
+from studies.findings.contacts import reads_support_force
 from studies.results.axes import Axis
 from studies.results.cells import CellRange, End, cell_ranges, words_of
 from studies.results.findings_common import LOOSE, told_statuses
-from studies.results.formatting import counted, listed, percent, quantity, spanned
+from studies.results.formatting import ROUNDING, counted, listed, percent, quantity, spanned
 from studies.results.results import Results
 
 MOST_TOLD = 3
@@ -19,10 +22,14 @@ def findings_of_cells(results: Results) -> list[str]:
     """The answer in sentences: first what the question names a limit of."""
     ranges, limits = {one.name: one for one in cell_ranges(results)}, _limits(results)
     sensors = sorted(results.sensors, key=lambda name: name not in limits)
-    shown = [name for sensor in sensors for name in (f"{sensor}_max", f"{sensor}_min")]
+    shown = [f"{sensor}_max" for sensor in limits]
+    shown += [name for sensor in sensors for name in (f"{sensor}_max", f"{sensor}_min") if name not in shown]
     shown += [f"{name}_contact_force_min" for name, one in results.study.carriage.items() if one.inertial]
     judged = {f"{sensor}_max": _judged(results, sensor, limit) for sensor, limit in limits.items()}
-    told = [f"{_told(results, ranges[name])}{judged.get(name, '')}" for name in shown if name in ranges][:MOST_TOLD]
+    shown = [name for name in shown if name in ranges][:MOST_TOLD]
+    told = [f"{_told(results, ranges[name])}{judged.get(name, '')}" for name in shown]
+    told += _other_limits(results, ranges, {name: own for name, own in limits.items() if f"{name}_max" not in shown})
+    told += _uplift(results, ranges)
     residual = "residual" in results.study.question
     kept = ["the extremes of every result", "the variants that have them", "the numbers of variants by status"]
     kept += ["percentiles"] if results.study.output.percentiles else []
@@ -63,6 +70,36 @@ def _judged(results: Results, sensor: str, limit: float) -> str:
     return (
         f"{said} in some variants of {many} of {counted(results.size, 'cell')}{_along(results, beyond)}{opened}{doubt}."
     )
+
+
+def _other_limits(results: Results, ranges: Mapping[str, CellRange], limits: Mapping[str, float]) -> list[str]:
+    """Which sensors that have no sentence of their own are beyond their limits in some variant, and by what."""
+    sizes = {name: _size(ranges, name) for name in limits if f"{name}_max" in ranges}
+    beyond = [
+        f"{name} (up to {quantity(size, results.sensors[name])})" for name, size in sizes.items() if size > limits[name]
+    ]
+    return [f"Of the other sensors with a limit {listed(beyond)} exceed{'s' * (len(beyond) == 1)} it too."] * bool(
+        beyond
+    )
+
+
+def _size(ranges: Mapping[str, CellRange], sensor: str) -> float:
+    return max(abs(ranges[f"{sensor}_max"].largest.value), abs(ranges[f"{sensor}_min"].smallest.value))
+
+
+def _uplift(results: Results, ranges: Mapping[str, CellRange]) -> list[str]:
+    """By how much supports pull in some variant, by more than rounding."""
+    least = {
+        name: -ranges[f"{name}_min"].smallest.value
+        for name, sensor in results.study.sensor.items()
+        if reads_support_force(sensor) and f"{name}_min" in ranges
+    }
+    pulls = [
+        f"{name} by up to {quantity(pull, 'N')}"
+        for name, pull in sorted(least.items(), key=lambda one: -one[1])
+        if pull > ROUNDING * _size(ranges, name)
+    ]
+    return [f"Supports pull: {listed(pulls)}."] * bool(pulls)
 
 
 def _doubt(perhaps: Mask, errors: Array, where: str, sensor: str) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from engine.scene.sensors import Sensor
 from results_schema.arrays import Array, Mask
 from studies.findings.absolute_errors import absolute_errors, told_error, weight
 from studies.findings.amplification import sizes
@@ -92,8 +93,12 @@ def told_uplift(results: Results, sensor: str, of: Sequence[str]) -> str:
 
 def _of_support(results: Results, sensor: str) -> bool:
     """Whether it reads a support's force, where any variant has a value."""
-    own = results.study.sensor[sensor].reads
-    return own.of_support and not own.turns and bool(np.isfinite(_least(results, sensor)).any())
+    return reads_support_force(results.study.sensor[sensor]) and bool(np.isfinite(_least(results, sensor)).any())
+
+
+def reads_support_force(sensor: Sensor) -> bool:
+    """Whether a sensor reads the whole force of a support, which pulls where it is negative."""
+    return sensor.reads.of_support and not sensor.reads.turns and not sensor.is_dynamic_part
 
 
 def _least(results: Results, sensor: str) -> Array:

@@ -230,7 +230,10 @@ def told_in_step(results: Results, place: Index) -> str:
 
 
 def told_pulsation(results: Results, place: Index) -> str:
-    """That a force pulsates with the first frequency of the body that it crosses, nearly, at a place of the sweep."""
+    """That a force pulsates with the first frequency of the body that it crosses, nearly, at a place of the sweep; ""
+    where what else stands on it shifts that."""
+    if any(own.inertial and own.on == results.carriage.on for own in results.study.carriage.values()):
+        return ""
     for name, carriage in results.study.carriage.items():
         if carriage.pulsates and carriage.on == results.carriage.on:
             key = f"carriage.{name}.pulsation.frequency"

@@ -213,13 +213,15 @@ def _changes(base: Array, places: Array) -> list[str]:
     if not np.isfinite(change).any():
         return []
     most, still = int(np.nanargmax(change)), [k + 1 for k in range(change.size) if change[k] < STILL]
+    if len(still) == change.size:
+        return [f"Along the way no frequency changes by more than {percent(STILL)}."]
     low, high = (float(np.nanmin(base[:, most])), float(np.nanmax(base[:, most])))
     at = float(places[int(np.nanargmin(base[:, most]))]), float(places[int(np.nanargmax(base[:, most]))])
     said = [
         f"Along the way frequency {most + 1} changes most, by {percent(float(change[most]))}: from {number(low, 4)} Hz "
         f"at {quantity(at[0], 'm')} to {number(high, 4)} Hz at {quantity(at[1], 'm')}."
     ]
-    if still and len(still) < change.size:
+    if still:
         names = listed([str(mode) for mode in still])
         said.append(
             f"Frequenc{'y' if len(still) == 1 else 'ies'} {names} stay{'s' if len(still) == 1 else ''} within "

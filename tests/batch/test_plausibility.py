@@ -12,6 +12,7 @@ from tests.engine.build import beam, cruise, fixed, force, mass, oscillator, shu
 from tests.studies.at_rest import PORTAL
 
 WAY = cruise(0.0, 1.0, 0.5)
+SWING = {"amplitude": 0.5, "frequency": 1.0}
 
 
 def passing(bed: Any = None, car: Any = None, **changes: Any) -> Study:
@@ -119,6 +120,14 @@ CASES = {
         sensor={"middle": fixed(0.5, "acceleration")},
     ),
     "the force of carriage car is negative, so that it lifts: weights are positive": passing(car=force(-0.1, WAY)),
+    "carriage car pulls for a part of each swing, as its amplitude, 2 N, is above its force": passing(
+        car=force(1.0, WAY, pulsation={"amplitude": 2.0, "frequency": 1.0})
+    ),
+    "b may set off later and yet in step with what else pulsates, as phases count from the run's start": study(
+        beam(),
+        {name: force(1.0, WAY, pulsation=SWING, delay=delay) for name, delay in (("a", 0.0), ("b", 1.0))},
+        sensor={"middle": fixed(0.5)},
+    ),
     "settling_band of sensor place, 20 m, is more than a hundredth of bed: was a smaller unit meant?": passing(
         car=mass(0.1, STOP), output={"residual": True}, sensor={"place": fixed(0.4) | {"settling_band": 20.0}}
     ),

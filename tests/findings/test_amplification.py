@@ -184,6 +184,18 @@ def test_the_support_that_pulls_most_is_told_with_the_first_of_them() -> None:
     assert f"Of the other supports {most} pulls by up to {quantity(-least[most], 'N')}" in said
 
 
+def test_dynamic_parts_of_reactions_lift_nothing() -> None:
+    """They swing about 0 while the support presses."""
+    own = {"left": fixed(0.0, "support_reaction"), "swings": fixed(0.0, "support_reaction") | {"part": "dynamic"}}
+    own["right"] = fixed(1.0, "support_reaction")
+    speeds = {"speed": {"of": "carriage.car.motion.speed", "values": [0.2, 0.4]}}
+    bed = beam(supports=[{"at": at, "stiffness": 1e4} for at in (0.0, 1.0)], own_weight=True)
+    found = studies.run(built(bed, force(0.5, cruise(0.0, 1.0, 0.1)), sensor=own, sweep=speeds))
+    assert float(found.swings_min.min()) < 0.0 < float(found.left_min.min())
+    told = "\n".join(answers.answer(found))
+    assert "No support lifts: the smallest reaction" in told and "pulls" not in told
+
+
 def test_a_remark_stands_once_in_an_answer() -> None:
     sensors = {"midspan": fixed(0.5), "quarter": fixed(0.25), "moment": fixed(0.5, "bending_moment")}
     speeds = {"speed": {"of": "carriage.car.motion.speed", "values": [0.02, 0.03]}}

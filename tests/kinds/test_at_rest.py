@@ -291,6 +291,14 @@ def test_a_table_must_stand_on_its_body() -> None:
 # ---- sentences and figures ----
 
 
+def test_frequencies_that_stay_as_they_are_have_one_sentence() -> None:
+    """ "Along the way frequency 1 changes most, by 0 %" was told of them."""
+    found = small.run("eigenfrequencies", "positions = 9\nmodes = 4", MASS).copy(deep=True)
+    found["base_frequency"][:] = found.base_frequency.isel(position=0)
+    text = "\n".join(answers.answer(found))
+    assert "Along the way no frequency changes by more than 0.1 %." in text and "changes most" not in text
+
+
 def test_sentences_of_frequencies_follow_the_data() -> None:
     found = small.run("eigenfrequencies", "positions = 9\nmodes = 4", MASS)
     text = "\n".join(answers.answer(found))

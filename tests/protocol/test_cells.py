@@ -275,6 +275,27 @@ def test_answers_of_cells_begin_with_the_limit_and_judge_it(
     assert quantity(values.min(), "m") in shown and quantity(values.max(), "m") in shown
 
 
+def test_every_limit_that_is_exceeded_and_supports_that_pull_are_told() -> None:
+    """One sensor's was left out, as three sentences were told, and so was uplift."""
+    more = "".join(
+        f'[sensor.more_{n}]\nbody = "beam"\nat = {at}\nquantity = "bending_moment"\n'
+        for n, at in enumerate((0.3, 0.4, 0.5, 0.6))
+    )
+    more += '[sensor.foot]\nbody = "beam"\nat = 0.0\nquantity = "support_reaction"\n'
+    text = TEXT.replace("[sweep]", f"{more}\n[question]\nbending_moment = 1e-3\n\n[sweep]")
+    found = studies.run(engine.load(text + KEPT["percentiles"]))
+    told = studies.answer(found)
+    assert [one.partition(":")[0] for one in told[:3]] == ["quarter_max", "more_0_max", "more_1_max"]
+    largest, smallest = (
+        float(found["largest"].sel(result="more_2_max").max()),
+        found["smallest"].sel(result="more_2_min"),
+    )
+    size = quantity(max(largest, -float(smallest.min())), "N m")
+    assert told[3].startswith(f"Of the other sensors with a limit more_2 (up to {size}) and more_3 (up")
+    least = float(found["smallest"].sel(result="foot_min").min())
+    assert least < 0.0 and f"Supports pull: foot by up to {quantity(-least, 'N')}." in told
+
+
 def test_limits_that_cells_keep_but_for_estimated_errors_are_no_verdict(whole: xr.Dataset, here: Path) -> None:
     """ "Nowhere" of values that are off by a sixth is told as what it is."""
     ends = [whole[f"quarter_{end}"].transpose("speed", "variant").values for end in ("max", "min")]

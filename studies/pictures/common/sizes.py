@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
+from results_schema.arrays import Array
 from studies.findings.amplification import largest, size_errors, sizes, told_amplification
 from studies.findings.effects import HARDLY, hardly_changed
 from studies.findings.in_step import WITH_MASSES, InStep, masses_ride, trains_in_step
@@ -109,14 +110,21 @@ def _has_gain(seen: View, sensor: str) -> bool:
     """Whether the amplification of a sensor is known and is more than a line at one height."""
     known = seen.plane(gain(seen.results, sensor))
     known = known[np.isfinite(known)]
-    return bool(known.size and np.ptp(known) > HARDLY)
+    return bool(known.size and not _is_level(seen, sensor, known))
+
+
+def _is_level(seen: View, sensor: str, known: Array) -> bool:
+    """Whether amplifications of a sensor are a line at one height; of dynamic parts, which may be small, beside the
+    largest."""
+    part = seen.results.study.sensor[sensor].is_dynamic_part
+    return bool(np.ptp(known) <= HARDLY * (float(known.max()) if part else 1.0))
 
 
 def _told_gain(seen: View, sensor: str) -> str:
     """The amplification of a sensor that is the same all over, as a sentence; "" where it is drawn, or unknown."""
     known = seen.plane(gain(seen.results, sensor))
     known = known[np.isfinite(known)]
-    if not known.size or np.ptp(known) > HARDLY:
+    if not known.size or not _is_level(seen, sensor, known):
         return ""
     part = seen.results.study.sensor[sensor].is_dynamic_part
     said = "Dynamic part over the largest static value" if part else "Dynamic amplification"
