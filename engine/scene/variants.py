@@ -211,10 +211,15 @@ class VariantValues:
     def timing(self) -> dict[str, tuple[Array, Array]]:
         """Per carriage pace and delay (V,) relative to the scene's time scale, rounded so that they group."""
         first = self.scene_time_scale
-        return {
-            name: (rounded(first / self.time_scale(name)), rounded(self.start_time(name) / first))
-            for name in self.study.carriage
-        }
+        return {name: (self._pace(name), rounded(self.start_time(name) / first)) for name in self.study.carriage}
+
+    def _pace(self, name: str) -> Array:
+        """(V,) of a carriage; of one that stands for no longer than the first moves that with which both end, so that
+        variants of different speeds share a scene."""
+        motion, clock = self.study.carriage[name].motion, self.study.carriage[self.study.clock].motion
+        own, first = self.time_scale(name), self.scene_time_scale
+        together = motion.rests_from == 0.0 and own * motion.duration <= first * clock.duration
+        return np.where(together, motion.duration / clock.duration, rounded(first / own))
 
     def own_mass(self, carriage: str) -> Array:
         """(V,) kg of a carriage by its own keys."""

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import engine
-from tests.engine.build import Table, beam, cruise, mass, shuttle, study, swing
+from engine.batch.plan import make_plan
+from tests.engine.build import Table, beam, cruise, mass, oscillator, shuttle, study, swing
 
 MOTIONS: dict[str, Table] = {
     "cruise": cruise(0.0, 1.0, 0.3, after=0.5),
@@ -57,3 +58,18 @@ def test_what_stands_stands_as_by_waypoints(first: bool) -> None:
     for name in found[0].data_vars:
         if found[0][name].dtype.kind == "f" and "contact" not in str(name):
             np.testing.assert_allclose(found[0][name], found[1][name], rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize(("time", "scenes"), [(1.0, 1), (2.0, 3), (20.0, 4)])
+def test_speeds_beside_a_carriage_that_stands_no_longer_share_a_scene(time: float, scenes: int) -> None:
+    """Passages take 1.25 to 5 s; of those that are shorter than it stands the run goes on until then."""
+    absorber = oscillator(0.05, 4.0, {"kind": "standing", "at": 0.5, "time": time}, damping=0.05)
+    given = study(beam(), {"car": mass(0.2, cruise(0.0, 1.0, 0.4)), "absorber": absorber}, solver={"steps": 1600})
+    speeds = [0.2, 0.4, 0.6, 0.8]
+    swept = given.with_values({"sweep": {"speed": {"of": "carriage.car.motion.speed", "values": speeds}}})
+    assert len(make_plan(swept).grids) == scenes
+    found = engine.run(swept)
+    for speed in speeds:
+        alone = engine.run(given.with_values({"carriage.car.motion.speed": speed}))
+        for name in ("midspan_max", "midspan_min", "absorber_contact_force_max"):
+            assert float(found[name].sel(speed=speed)) == pytest.approx(float(alone[name]), rel=1e-6)
