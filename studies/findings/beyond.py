@@ -203,7 +203,8 @@ def where_beyond(results: Results, values: Array, threshold: float, axis: Axis |
 
 
 def where(results: Results, beyond: Mask, axis: Axis | None) -> str:
-    """In which part of the sweep variants are beyond something, as of `where_beyond`."""
+    """In which part of the sweep variants are beyond something, as of `where_beyond`; along what is swept alone too."""
+    axis = results.axes[0] if axis is None and len(results.axes) == 1 else axis
     if not beyond.any() and sum(one.values.size > 1 for one in results.axes) > 1:
         return "nowhere in the sweep"
     if axis is not None and VARIANT in results.dims and _has_samples(results, axis):

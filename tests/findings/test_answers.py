@@ -276,10 +276,14 @@ def test_where_a_value_that_is_hardly_known_exceeds_a_limit_is_said_with_its_err
     assert any("Its absolute value exceeds 3.4 m/s² at 4 m/s." in said for said in exact)
 
 
-def test_without_swept_speeds_variants_that_exceed_statics_are_counted() -> None:
-    dataset = scenes.run("passage", 'mass = { of = "carriage.table.mass", values = [10, 600] }')
+def test_without_swept_speeds_variants_that_exceed_statics_are_told_by_what_is_swept_alone_or_counted() -> None:
+    masses = 'mass = { of = "carriage.table.mass", values = [10, 600] }'
+    dataset = scenes.run("passage", masses)
     dataset["dynamic_amplification"].loc[{"sensor": "midspan"}] = [1.0, 1.3]
-    assert "The dynamic amplification exceeds 1.1 in 1 variant of 2." in answers.answer(dataset)[0]
+    assert "The dynamic amplification exceeds 1.1 at 600 kg." in answers.answer(dataset)[0]
+    dataset = scenes.run("passage", masses + '\nzeta = { of = "body.bed.damping_ratio", values = [0.01, 0.02] }')
+    dataset["dynamic_amplification"].loc[{"sensor": "midspan"}] = [[1.0, 1.0], [1.3, 1.0]]
+    assert "The dynamic amplification exceeds 1.1 in 1 variant of 4." in answers.answer(dataset)[0]
     assert "The dynamic amplification" not in said("passage")
 
 
