@@ -103,16 +103,16 @@ def vanishes(plan: Plan) -> Iterator[str]:
 
 
 def pulsates_together(plan: Plan) -> Iterator[str]:
-    """One sentence where forces that set off at times of their own pulsate in step all the same, as phases count from
-    the run's start. Axles of a train are meant to."""
+    """One sentence where one of several forces sets off later, whose phases count from the run's start. Axles of a
+    train are meant to pulsate in step."""
     study, swept = plan.study, {key for axis in plan.study.sweep.axes.values() for key in axis.of}
     each = [name for name, own in study.carriage.items() if own.pulsates and name not in study.axles]
     phases = [f"carriage.{name}.pulsation.phase" for name in each]
     later = [name for name in each if study.carriage[name].start_time > 0.0 or f"carriage.{name}.delay" in swept]
     if len(each) > 1 and later and not any(key in swept or study.value(key) for key in phases):
         yield (
-            f"{' and '.join(later)} may set off later and yet in step with what else pulsates, as phases count from "
-            "the run's start: a phase of -2 pi frequency delay begins one where it sets off"
+            f"phases count from the run's start, not from when {' and '.join(later)} set{'s' * (len(later) == 1)} off, "
+            "so that persons of one pace walk in step: a phase of -2 pi frequency delay begins one as it sets off"
         )
 
 

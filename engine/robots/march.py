@@ -32,7 +32,7 @@ from results_schema.status import Status
 if TYPE_CHECKING:
     from engine.robots.model import RobotModel
 
-SAME = 1e-9  # of the whole time: closer events are one
+SAME = 1e-9  # of the whole time: closer events are one, as a move that begins where another ends, but for rounding
 NEWTON = 1e-4  # of the tolerance: what is left of a step's corrections, over the largest motion
 
 

@@ -214,11 +214,12 @@ class VariantValues:
         return {name: (self._pace(name), rounded(self.start_time(name) / first)) for name in self.study.carriage}
 
     def _pace(self, name: str) -> Array:
-        """(V,) of a carriage; of one that stands for no longer than the first moves that with which both end, so that
-        variants of different speeds share a scene."""
+        """(V,) of a carriage; of one that stands from time 0 on for no longer than the first moves that with which both
+        end, so that variants of different speeds share a scene."""
         motion, clock = self.study.carriage[name].motion, self.study.carriage[self.study.clock].motion
         own, first = self.time_scale(name), self.scene_time_scale
-        together = motion.rests_from == 0.0 and own * motion.duration <= first * clock.duration
+        stands = (motion.rests_from == 0.0) & (self.start_time(name) == 0.0)
+        together = stands & (own * motion.duration <= first * clock.duration)
         return np.where(together, motion.duration / clock.duration, rounded(first / own))
 
     def own_mass(self, carriage: str) -> Array:

@@ -73,18 +73,25 @@ def _judged(results: Results, sensor: str, limit: float) -> str:
 
 
 def _other_limits(results: Results, ranges: Mapping[str, CellRange], limits: Mapping[str, float]) -> list[str]:
-    """Which sensors that have no sentence of their own are beyond their limits in some variant, and by what."""
-    sizes = {name: _size(ranges, name) for name in limits if f"{name}_max" in ranges}
-    beyond = [
-        f"{name} (up to {quantity(size, results.sensors[name])})" for name, size in sizes.items() if size > limits[name]
-    ]
-    return [f"Of the other sensors with a limit {listed(beyond)} exceed{'s' * (len(beyond) == 1)} it too."] * bool(
-        beyond
+    """Which sensors that have no sentence of their own are beyond their limits in some variant, and by what; and which
+    may be by their estimated errors, or have no estimate."""
+    ends = {name: _size(ranges, name) for name in limits if f"{name}_max" in ranges}
+    beyond = {name: end for name, end in ends.items() if abs(end.value) > limits[name]}
+    perhaps = {
+        name: "As no estimate exists" if np.isnan(end.error) else "By its estimated errors"
+        for name, end in ends.items()
+        if name not in beyond and not abs(end.value) / max(1.0 - end.error, LEAST_PART) <= limits[name]
+    }
+    told = [f"{name} (up to {quantity(abs(end.value), results.sensors[name])})" for name, end in beyond.items()]
+    said = [f"Of the other sensors with a limit {listed(told)} exceed{'s' * (len(told) == 1)} it too."] * bool(told)
+    return said + [f"{why} {name} perhaps exceeds its limit." for name, why in perhaps.items()]
+
+
+def _size(ranges: Mapping[str, CellRange], sensor: str) -> End:
+    """The extreme of a sensor that is farther from 0."""
+    return max(
+        ranges[f"{sensor}_max"].largest, ranges[f"{sensor}_min"].smallest, key=lambda end: float(np.abs(end.value))
     )
-
-
-def _size(ranges: Mapping[str, CellRange], sensor: str) -> float:
-    return max(abs(ranges[f"{sensor}_max"].largest.value), abs(ranges[f"{sensor}_min"].smallest.value))
 
 
 def _uplift(results: Results, ranges: Mapping[str, CellRange]) -> list[str]:
@@ -97,7 +104,7 @@ def _uplift(results: Results, ranges: Mapping[str, CellRange]) -> list[str]:
     pulls = [
         f"{name} by up to {quantity(pull, 'N')}"
         for name, pull in sorted(least.items(), key=lambda one: -one[1])
-        if pull > ROUNDING * _size(ranges, name)
+        if pull > ROUNDING * abs(_size(ranges, name).value)
     ]
     return [f"Supports pull: {listed(pulls)}."] * bool(pulls)
 

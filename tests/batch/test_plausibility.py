@@ -123,7 +123,7 @@ CASES = {
     "carriage car pulls for a part of each swing, as its amplitude, 2 N, is above its force": passing(
         car=force(1.0, WAY, pulsation={"amplitude": 2.0, "frequency": 1.0})
     ),
-    "b may set off later and yet in step with what else pulsates, as phases count from the run's start": study(
+    "phases count from the run's start, not from when b sets off, so that persons of one pace walk in step": study(
         beam(),
         {name: force(1.0, WAY, pulsation=SWING, delay=delay) for name, delay in (("a", 0.0), ("b", 1.0))},
         sensor={"middle": fixed(0.5)},

@@ -12,7 +12,7 @@ import time
 from dataclasses import replace
 from functools import partial
 from multiprocessing import get_context
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -20,23 +20,14 @@ from engine.linear_algebra import one_thread
 from engine.robots.converge import Ladder, Rung, climb, marched
 from engine.robots.model import build
 from engine.robots.modes import open_bodies, with_finer_bodies, with_modes
-from engine.robots.results import are_held, are_largest, differences, results_of
+from engine.robots.results import Outcome, are_held, are_largest, are_of_drives, differences, results_of
 from engine.scene.study import Study
-from results_schema.arrays import Array
 from tests.calibration.held import Row, row_of, tell
 from tests.robots.scenes import scene
 
 FINER = (1, 2), (2, 3)  # times that elements and modes, and steps, are doubled
 GROUPS = "histories", "largest values", "drives"
 MOST_MODES = 160  # of a rail
-
-
-class Told(NamedTuple):
-    """Errors (results,) that are told, true ones and those of the truth, over the tolerance."""
-
-    told: Array
-    true: Array
-    doubt: Array
 
 
 def draw(seed: int, number: int, tolerance: float) -> Study:
@@ -56,7 +47,7 @@ def draw(seed: int, number: int, tolerance: float) -> Study:
     return given.with_values(values)
 
 
-def finer(ladder: Ladder, rung: Rung, bodies: int, steps: int) -> Any:
+def finer(ladder: Ladder, rung: Rung, bodies: int, steps: int) -> Outcome:
     """What a march of so many times twice the elements, modes and steps of what is told reports."""
     study = ladder.study
     for _ in range(bodies):
@@ -75,9 +66,9 @@ def judged(seed: int, tolerance: float, number: int) -> list[Row]:
         return []
     near, truth = (finer(ladder, found.rung, *more) for more in FINER)
     names = results_of(found.model)
-    held, largest = are_held(names), are_largest(names)
+    held = are_held(names)
     true, doubt = (differences(found.model, one, truth) / tolerance for one in (found.outcome, near))
-    groups = zip(GROUPS, (held & ~largest, largest, ~held & ~largest), strict=True)
+    groups = zip(GROUPS, (held, are_largest(names), are_of_drives(names)), strict=True)
     marked = bool(found.error[held].max() > tolerance)
     return [row_of(number, name, marked, true[own], found.error[own] / tolerance, doubt[own]) for name, own in groups]
 

@@ -60,6 +60,14 @@ def test_what_stands_stands_as_by_waypoints(first: bool) -> None:
             np.testing.assert_allclose(found[0][name], found[1][name], rtol=1e-9, atol=1e-12)
 
 
+def test_a_carriage_that_stands_later_does_not_make_the_run_longer() -> None:
+    """Its delay and its time end before the passage does."""
+    absorber = oscillator(0.05, 4.0, {"kind": "standing", "at": 0.5, "time": 1.0}, delay=1.0)
+    given = study(beam(), {"car": mass(0.2, cruise(0.0, 1.0, 0.2)), "absorber": absorber}, solver={"steps": 1600})
+    found = engine.run(given.with_values({"output.histories": "all"}))
+    assert float(found["elapsed"].max()) == pytest.approx(5.0)
+
+
 @pytest.mark.parametrize(("time", "scenes"), [(1.0, 1), (2.0, 3), (20.0, 4)])
 def test_speeds_beside_a_carriage_that_stands_no_longer_share_a_scene(time: float, scenes: int) -> None:
     """Passages take 1.25 to 5 s; of those that are shorter than it stands the run goes on until then."""

@@ -275,6 +275,14 @@ def test_answers_of_cells_begin_with_the_limit_and_judge_it(
     assert quantity(values.min(), "m") in shown and quantity(values.max(), "m") in shown
 
 
+def _largest(found: xr.Dataset) -> float:
+    """The largest absolute moment."""
+    names = ("quarter", "more_0", "more_1", "more_2", "more_3")
+    sides = ("largest", "max"), ("smallest", "min")
+    ends = [found[side].sel(result=[f"{name}_{end}" for name in names]) for side, end in sides]
+    return max(float(np.abs(end).max()) for end in ends)
+
+
 def test_every_limit_that_is_exceeded_and_supports_that_pull_are_told() -> None:
     """One sensor's was left out, as three sentences were told, and so was uplift."""
     more = "".join(
@@ -292,6 +300,12 @@ def test_every_limit_that_is_exceeded_and_supports_that_pull_are_told() -> None:
     )
     size = quantity(max(largest, -float(smallest.min())), "N m")
     assert told[3].startswith(f"Of the other sensors with a limit more_2 (up to {size}) and more_3 (up")
+    for error, why in ((0.5, "By its estimated errors"), (np.nan, "As no estimate exists")):
+        wide = studies.run(engine.load(text.replace("1e-3", f"{1.1 * _largest(found)!r}") + KEPT["percentiles"]))
+        assert not any("perhaps" in one for one in studies.answer(wide))
+        for side in ("largest", "smallest"):
+            wide[f"{side}_error"].loc[{"result": ["more_2_max", "more_2_min"]}] = error
+        assert f"{why} more_2 perhaps exceeds its limit." in studies.answer(wide)
     least = float(found["smallest"].sel(result="foot_min").min())
     assert least < 0.0 and f"Supports pull: foot by up to {quantity(-least, 'N')}." in told
 

@@ -32,8 +32,8 @@ def delayed(count: int) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("given", "told"),
     [
-        (walkers({}, {"delay": 1.0}), "w2 may set off later and yet in step"),
-        (walkers({}, {}, **delayed(2)), "w2 may set off later and yet in step"),
+        (walkers({}, {"delay": 1.0}), "phases count from the run's start, not from when w2 sets off, "),
+        (walkers({}, {}, **delayed(2)), "phases count from the run's start, not from when w2 sets off, "),
         (walkers({}, {}), ""),
         (walkers({"delay": 1.0}), ""),
         (walkers({}, {"delay": 1.0, "pulse": {"phase": -2.0}}), ""),
