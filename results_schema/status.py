@@ -11,7 +11,8 @@ _MESSAGES = (
     "an eigenvalue, tie or Newton solution did not converge; no values",
     "the march left the finite numbers; no values",
     "the worker died in this variant; no values",
-    "a body turns too fast without stiffening by its rotation, or bends too far for small deflections; values kept",
+    "a body turns too fast without stiffening by its rotation, buckles under its weight, or bends too far for small "
+    "deflections; values kept",
     "a joint of a robot is softer than the weight that it has to hold up, and falls over; no values",
 )
 

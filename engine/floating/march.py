@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.floating.lanes import in_blocks, lanes, out_of_blocks
+from engine.floating.theory import buckling_ratios
 from engine.kernels.floating import layout
 from engine.kernels.floating.layout import Lane, Record, Weights
 from engine.kernels.floating.march import march as march_lanes
@@ -32,7 +33,7 @@ class Marched:
     """What a march of V variants leaves: statistics (V, signals, STATISTICS), history (V, stations, signals) with its
     times (V, stations) s, statuses (V,), the step (V,) s, and the last station that each has reached (V,); stops
     (V, tips) s, infinite where there is none, and settled (V, tips, bands): steps after which tips are within bands for
-    good, -inf where they always are."""
+    good, -inf where they always are; buckling_ratio (V, B): weight at time 0 over what makes a body buckle."""
 
     statistics: Array
     history: Array
@@ -42,6 +43,7 @@ class Marched:
     last: Counts
     stops: Array
     settled: Array
+    buckling_ratio: Array
 
 
 def march(
@@ -73,7 +75,8 @@ def march(
     pulls = statistics[:, first : model.signal_of("ends") : OF_CARRIAGE, layout.SMALLEST] < 0.0
     lifts = np.any(pulls & _may_lift(model, table.gravity, history[:, 0]), axis=1)
     status = gravest(STATUS[codes], np.where(lifts, np.int8(Status.SEPARATED), np.int8(Status.OK)))
-    return Marched(statistics, history, stations * h[:, None], status, h, last, table.stops, settled)
+    ratio = buckling_ratios(model, table, history[:, 0])
+    return Marched(statistics, history, stations * h[:, None], status, h, last, table.stops, settled, ratio)
 
 
 def _may_lift(model: FloatingModel, gravity: Array, signals: Array) -> Mask:

@@ -177,7 +177,9 @@ def outcome(model: FloatingModel, marched: Marched) -> Outcome:
     limits = {"unstiffened_time": unstiffened_times(model, marched), "bent_time": bent_times(model, marched)}
     for array in (*found.values(), *other_bands.values(), marched.history):
         array[lost(marched.status)] = np.nan
-    left = np.isfinite(np.concatenate(list(limits.values()), axis=1)).any(axis=1)
+    buckles = (marched.buckling_ratio >= 1.0).any(axis=1)
+    left = np.isfinite(np.concatenate(list(limits.values()), axis=1)).any(axis=1) | buckles
+    limits["buckling_ratio"] = marched.buckling_ratio
     status = gravest(marched.status, np.where(left, np.int8(Status.BEYOND_THEORY), np.int8(Status.OK)))
     ended = duration < marched.times[:, -1] * (1.0 - ROUNDING)
     sooner = np.where(ended, 1.0 / np.maximum(marched.last, 1), 0.0)

@@ -1,4 +1,5 @@
-"""Where the theory ends: bodies that turn fast without getting stiffer by it, that bend far, and ends of tracks."""
+"""Where the theory ends: bodies that turn fast without getting stiffer by it, that buckle under what they carry, that
+bend far, and ends of tracks."""
 
 from __future__ import annotations
 
@@ -7,12 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from engine.floating.lanes import lanes
-from engine.kernels.floating.layout import REVOLUTE
-from engine.kernels.floating.observe import BODY_SPIN, OF_BODY
+from engine.kernels.floating.layout import OWN_MASS, REVOLUTE, SPRUNG_MASS, Lane
+from engine.kernels.floating.observe import BODY_ATTITUDE, BODY_SPIN, OF_BODY, OF_CARRIAGE
 from engine.scene.motions.of_joints import AMPLITUDE, CONSTANT, PHASE, RATE, START
 from results_schema.arrays import Array, Mask
 
 if TYPE_CHECKING:
+    from engine.floating.bodies.shortening import Shortening
     from engine.floating.march import Marched
     from engine.floating.model import FloatingModel
     from engine.scene.variants import VariantValues
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
 #: rate of a fifth of it.
 MISSING = 0.05
 RATES = 513  # times at which given motions are looked at beforehand
+PRESSED = 1e-3  # of the weight that makes a body buckle: less is nothing to speak of
 DEEP = 0.1  # of the length, as of bodies that stand: a cantilever's deflection is off by 1 % then
 
 
@@ -44,6 +47,54 @@ def lacking(model: FloatingModel, name: str) -> Array:
         ratio = np.einsum("ab,abij->ij", across, moments) / np.multiply.outer(body.omega, body.omega)
         found.append(np.abs(np.linalg.eigvalsh(ratio)).max())
     return np.array(found)
+
+
+def buckling_ratios(model: FloatingModel, table: Lane, signals: Array) -> Array:
+    """(V, B) the weight that stands on each body, its own and that of all that hangs and rides on it, over that under
+    which it buckles, as variants of a table stand by their signals (V, ...) at time 0: the largest eigenvalue of what
+    weight softens the body by over diag(omega^2). NaN below `PRESSED`, and where it is not known, as of bodies out of
+    finite-element files."""
+    found = np.full((len(signals), len(model.bodies)), np.nan)
+    first = model.signal_of("frames") + BODY_ATTITUDE
+    for b, (name, body) in enumerate(model.bodies.items()):
+        shorter = body.shortening
+        if shorter is None or not body.omega.size:
+            continue
+        nine = slice(first + OF_BODY * b, first + OF_BODY * b + 9)
+        up = np.einsum("vi,vij->vj", table.gravity, signals[:, nine].reshape(-1, 3, 3))[:, : shorter.axes]
+        pressed = _pressed(model, name, shorter, table, signals) / np.multiply.outer(body.omega, body.omega)
+        softer = np.einsum("va,vaij->vij", up, pressed)
+        known = np.isfinite(softer).all(axis=(1, 2))
+        found[known, b] = np.linalg.eigvalsh(softer[known])[:, -1]
+    return np.where(found > PRESSED, found, np.nan)
+
+
+def _pressed(model: FloatingModel, name: str, shorter: Shortening, table: Lane, signals: Array) -> Array:
+    """(V, A, N, N) the integral of G dm over a body and all that hangs and rides on it."""
+    places, masses = [], []
+    for other in model.bodies:
+        if model.frame(other).on == name:
+            at = model.frame(other).at
+            places.append(np.full(len(signals), model.bodies[name].length if at is None else at))
+            masses.append(_borne(model, other, table))
+    for c, carriage in enumerate(model.study.carriage.values()):
+        if carriage.on == name:
+            places.append(signals[:, model.signal_of("carriages") + OF_CARRIAGE * c])
+            masses.append(table.carriages[:, c, OWN_MASS] + table.carriages[:, c, SPRUNG_MASS])
+    found = np.repeat(shorter.integrals[0][None], len(signals), axis=0)
+    for x, mass in zip(places, masses, strict=True):
+        distinct, of = np.unique(x, return_inverse=True)
+        found = found + mass[:, None, None, None] * shorter.along(distinct)[0][of]
+    return found
+
+
+def _borne(model: FloatingModel, name: str, table: Lane) -> Array:
+    """(V,) kg of a body and of all that hangs and rides on it."""
+    own = np.full(len(table.gravity), _carried(model, name))
+    for c, carriage in enumerate(model.study.carriage.values()):
+        if name in model.carriers(carriage.on):
+            own += table.carriages[:, c, OWN_MASS] + table.carriages[:, c, SPRUNG_MASS]
+    return own
 
 
 def _carried(model: FloatingModel, name: str) -> float:

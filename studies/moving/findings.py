@@ -6,6 +6,7 @@ import numpy as np
 
 from engine.march.settling import names_of_times
 from engine.scene.frames import GROUND
+from results_schema.arrays import Mask
 from results_schema.quantities import AFTER_STOP
 from studies.findings.absolute_errors import errors_of_size
 from studies.findings.amplification import sizes
@@ -222,8 +223,8 @@ def _momentum(results: Results) -> Iterator[str]:
 
 
 def _beyond_theory(results: Results) -> Iterator[str]:
-    """Bodies that turn fast without getting stiffer by it, and bodies that bend far: in how many variants, and where
-    and when first."""
+    """Bodies that turn fast without getting stiffer by it, that buckle, and that bend far: in how many variants, and
+    where and when first."""
     for name in results.study.frame:
         reasons = {
             "unstiffened_time": "turns so fast that it lacks over 5 % of its stiffness, "
@@ -234,7 +235,21 @@ def _beyond_theory(results: Results) -> Iterator[str]:
             times = results.dataset[variable].sel(frame=name).values
             place = extreme(times, np.nanargmin)
             if place is not None:
-                many = counted(int(np.isfinite(times).sum()), "variant")
-                of = f" in {many} of {results.size:,}" if results.size > 1 else ""
                 first = quantity(float(times[place]), "s")
+                of = _in_variants(results, np.isfinite(times))
                 yield f"{name} {words}{of}, from {first} on{in_words(results, place)}: beyond the theory."
+        ratio = results.dataset["buckling_ratio"].sel(frame=name).values
+        place = extreme(ratio, np.nanargmax)
+        if place is not None and ratio[place] >= 1.0:
+            of = _in_variants(results, ratio >= 1.0)
+            yield (
+                f"{name} buckles under the weight that stands on it at time 0{of}: it is up to {ratio[place]:.3g} "
+                f"times what it can carry{in_words(results, place)}. What stands exactly upright stays so, as nothing "
+                "disturbs it: beyond the theory."
+            )
+
+
+def _in_variants(results: Results, which: Mask) -> str:
+    """In how many of them; "" of one alone."""
+    many = counted(int(np.count_nonzero(which)), "variant")
+    return f" in {many} of {results.size:,}" if results.size > 1 else ""

@@ -150,6 +150,14 @@ RESULTS = (
             ("bent_time", "bend by more than a tenth of its length"),
         )
     ),
+    Variable(
+        "buckling_ratio",
+        ("frame",),
+        long_name="weight that stands on a body at time 0 over that under which it buckles",
+        meaning="its own and that of all it carries, by its modes; NaN below a thousandth, and where it is not known",
+        required=False,
+        nan_allowed=True,
+    ),
     _history("end_place", ("frame", "component"), "m", "place over the ground of the far end of a track"),
     _history("frame_place", ("frame", "component"), "m", "place over the ground of the frame of a body"),
     _history("frame_attitude", ("frame", "quaternion"), "", "attitude of the frame of a body, as a unit quaternion"),

@@ -127,3 +127,45 @@ def test_what_bends_far_is_marked() -> None:
         assert found["tip_max"] == pytest.approx(tip, rel=0.05)
         assert found["status"] == status
         assert np.isfinite(found["bent_time"]).all() == (status == Status.BEYOND_THEORY)
+
+
+def column(masses: list[float], body: dict[str, object], turned: float = -90.0, **more: object) -> Study:
+    """The arm on end, with a mass on top."""
+    head = {"kind": "rigid", "length": 0.1, "mass": masses[0], "inertia": 1e-6, "centre": 0.0}
+    tables: dict[str, object] = {
+        "body": {"arm": ARM | {"modes": 6, "damping_ratio": 0.02} | body, "head": head},
+        "frame": {"arm": {"turned": [0, f"{turned} deg", 0]}, "head": {"on": "arm"}},
+        "sensor": {"tip": {"body": "arm", "at": 10.0}},
+        "sweep": {"m": {"of": "body.head.mass", "values": masses}},
+        "question": {"duration": 1.0},
+        "expected": ["beyond-theory"],
+    }
+    return Study(kind="moving-frames", gravity=9.81, **(tables | more))
+
+
+EULER = np.pi**2 * 7e10 * 2e-7 / (4.0 * 10.0**2) / 9.81  # kg
+LIGHT = {"density": 1e-3}
+
+
+def test_what_buckles_under_what_stands_on_it_is_told() -> None:
+    """Euler's load of a cantilever; what stands upright exactly would stand still, and be fine."""
+    found = studies.run(column([0.5 * EULER, 0.99 * EULER, 1.01 * EULER], LIGHT))
+    ratio = found["buckling_ratio"].sel(frame="arm").values
+    np.testing.assert_allclose(ratio, [0.5, 0.99, 1.01], rtol=2e-3)
+    assert found["status"].values.tolist() == [Status.OK, Status.OK, Status.BEYOND_THEORY]
+    assert np.isnan(found["buckling_ratio"].sel(frame="head")).all()
+    (said,) = (line for line in KIND.findings(Results.of(found)) if "buckles" in line)
+    assert "in 1 variant of 3" in said and "1.01 times what it can carry" in said
+    hanging = studies.run(column([EULER, 9.0 * EULER], LIGHT, turned=90.0))
+    assert np.isnan(hanging["buckling_ratio"]).all() and (hanging["status"] == Status.OK).all()
+
+
+def test_columns_buckle_by_their_own_weight_and_by_what_stands_halfway() -> None:
+    """Greenhill (1881): w L^3/(E I) = 7.8373; a carriage that stands halfway loads half of the column."""
+    heavy = {"density": 7.8373 * 7e10 * 2e-7 / (10.0**3 * 9.81 * 4e-4)}
+    own = studies.run(column([1e-6], heavy))
+    assert own["buckling_ratio"].sel(frame="arm").item() == pytest.approx(1.0, rel=2e-3)
+    stands = {"kind": "standing", "at": 5.0}
+    carriage = {"kind": "mass", "on": "arm", "mass": 3.0 * EULER, "bilateral": True, "motion": stands}
+    halfway = studies.run(column([1e-6], LIGHT, carriage={"table": carriage}))
+    assert halfway["buckling_ratio"].sel(frame="arm").item() == pytest.approx(0.75, rel=5e-3)

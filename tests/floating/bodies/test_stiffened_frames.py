@@ -178,6 +178,17 @@ def test_it_lacks_the_stiffness_of_a_beam() -> None:
     assert other[2] > 0.05
 
 
+def test_it_buckles_under_the_weight_that_makes_a_beam_buckle() -> None:
+    """Upright; leaning halfway over, by what its weight has along it."""
+    found = []
+    for body in (arm(3), ARM | {"modes": 3, "own_weight": True}):
+        for turned in ("-90 deg", "-30 deg"):
+            scene = study(body, {"turned": [0, turned, 0]}, gravity=9.81)
+            found.append(steps(scene, 1.0, 10, 10, FOX_GOODWIN)[1].buckling_ratio[0, 0])
+    assert found[:2] == pytest.approx(found[2:], rel=1e-5)
+    assert found[1] == pytest.approx(0.5 * found[0], rel=1e-9)
+
+
 @pytest.mark.parametrize("kind", ["beam", "frame"])
 def test_ends_and_position_errors_come_nearer(kind: str) -> None:
     """By half of int w'^2 of what the arm bends by, along a track that rests, as its weight sets it swinging."""
