@@ -9,6 +9,7 @@ from pathlib import Path
 import engine
 from results_schema.store.archive import open_archive
 from studies.commands import catalogue
+from studies.protocol.library import find_study
 from studies.protocol.options import RunOptions
 from studies.reporting import summary
 from studies.reporting.answers import answer_of, figures_of
@@ -39,7 +40,7 @@ def main(names: list[str]) -> None:
 
 def _made(name: str, folder: Path) -> dict[str, object]:
     """Run one study: its seconds, exit code, question, answer and the caption of its picture, which is drawn."""
-    study = engine.load(catalogue.find_study(name))
+    study = engine.load(find_study(name))
     started = time.perf_counter()
     outcome: Outcome = run_to_archive(study, folder / f"{name}.nc", RunOptions())
     seconds = time.perf_counter() - started

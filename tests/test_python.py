@@ -70,6 +70,23 @@ def test_an_option_that_the_study_says_is_told_where(run: Any) -> None:
     assert 'study.with_values({"solver.tolerance": ...})' in refused(run, scenes.study("passage"), tolerance=1e-2)
 
 
+@pytest.mark.parametrize("run", RUNS)
+def test_progress_is_told_to_a_function(run: Any) -> None:
+    said = refused(run, scenes.study("passage"), progress=True)
+    assert said.startswith("progress: this cannot be called; expected a function") and "received True" in said
+
+
+def test_a_misspelt_built_in_study_is_found() -> None:
+    said = refused(studies.run, "passge")
+    assert said.startswith("passge: no such file, and no built-in study") and 'did you mean "passage"?' in said
+
+
+@pytest.mark.parametrize("values", ["carriage.table.mass", 3, ["mass", 3]])
+def test_values_are_wanted_by_their_keys(values: Any) -> None:
+    said = refused(scenes.study("passage").with_values, values)
+    assert said.startswith("values: these are no values; expected a table of values by dotted key")
+
+
 @pytest.mark.parametrize(("run", "category"), [(engine.run, engine.Remark), (studies.run, studies.Remark)])
 def test_what_is_often_a_mistake_is_a_warning(run: Any, category: type[Warning]) -> None:
     with pytest.warns(category, match='70 Pa: no beam has this.*did you mean "70 GPa"') as told:

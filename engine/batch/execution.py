@@ -57,7 +57,7 @@ def run(
     from engine.batch.dataset import build
     from engine.batch.plausibility import remarks
 
-    check_options(where, "chunk", "reduction", "results", "progress")
+    check_options({**where, "progress": progress}, "chunk", "reduction", "results", "progress")
     check_chunk(chunk)
     study = study_of(study)
     plan = make_plan(study, reduction=reduction, results=results)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import queue
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
@@ -122,9 +122,9 @@ def _counts_threads(given: object) -> bool:
     return isinstance(given, Integral) and int(given) >= 1
 
 
-def check_options(given: Iterable[str], *known: str) -> None:
-    """Refuse options that are neither known nor say where to run. Raises BadInput with the nearest one, or how a study
-    says that."""
+def check_options(given: Mapping[str, Any], *known: str) -> None:
+    """Refuse options that are neither known nor say where to run, and a progress that cannot be told. Raises BadInput
+    with the nearest one, or how a study says that."""
     from engine.scene.settings import setting_named
     from engine.study_file.spec import nearest
 
@@ -135,6 +135,10 @@ def check_options(given: Iterable[str], *known: str) -> None:
             key = setting_named(name)
             remedy = f'the study says that: study.with_values({{"{key}": ...}})' if key else nearest(name, options)
             raise BadInput("unknown option", where=name, expected=expected, remedy=remedy)
+    progress = given.get("progress")
+    if progress is not None and not callable(progress):
+        expected = "a function of what is finished, progress=print say"
+        raise BadInput("this cannot be called", where="progress", expected=expected, received=repr(progress))
 
 
 def check_chunk(chunk: object) -> None:

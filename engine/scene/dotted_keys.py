@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from engine.study_file.refusals import Keys
 from engine.study_file.spec import Spec
+from results_schema.errors import BadInput
 
 # numbers that do not belong to the model
 FIXED = ("schema_version", "expected", "sweep", "output", "question", "solver.audit", "envelope")
@@ -30,6 +31,15 @@ def _inside(value: Any) -> dict[str, Any]:
     if isinstance(value, tuple):
         return {str(index): item for index, item in enumerate(value)}
     return value if isinstance(value, dict) else {}
+
+
+def values_by_key(given: Mapping[str, Any] | Iterable[tuple[str, Any]]) -> dict[str, Any]:
+    """Values by dotted key, of a table or of pairs. Raises BadInput of anything else."""
+    try:
+        return dict(given)
+    except (TypeError, ValueError):
+        expected = 'a table of values by dotted key, {"carriage.table.mass": 100} say'
+        raise BadInput("these are no values", where="values", expected=expected, received=repr(given)[:80]) from None
 
 
 def with_value(data: dict[str, Any], path: str, value: Any) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from engine.bodies import BODIES, AnyBody
 from engine.bodies.modal.description import Recorded, Spots
 from engine.bodies.modal.section_doubts import Doubt, damping_doubt
 from engine.scene.carriages import AnyCarriage
-from engine.scene.dotted_keys import numbers_in, value_in, with_value
+from engine.scene.dotted_keys import numbers_in, value_in, values_by_key, with_value
 from engine.scene.frames import Frame, inertia_checks
 from engine.scene.loads import Load, Spring
 from engine.scene.references import check_names, check_references
@@ -257,7 +257,7 @@ class Study(Scene):
 
         Raises BadInput, also for a key that an axis of the sweep sets, unless that axis is given anew.
         """
-        data, values = self._data, dict(values)
+        data, values = self._data, values_by_key(values)
         for name, axis in self.sweep.axes.items():
             if (lost := next((path for path in axis.of if path in values), None)) and not _is_of_sweep(name, values):
                 raise self._source.fault(

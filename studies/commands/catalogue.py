@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, cast
 
 from results_schema.errors import BadInput, did_you_mean
-from results_schema.store.files import is_hdf5
 from studies.protocol.library import LIBRARY, built_in, studies_in
 from studies.protocol.study import KINDS
 
@@ -44,30 +43,6 @@ def measured() -> Mapping[str, Mapping[str, Any]]:
     """Seconds on two cores, exit code and answer of built-in studies by name, as the gallery found them."""
     found: dict[str, dict[str, Any]] = json.loads(MEASURED.read_text(encoding="utf-8"))
     return found
-
-
-def find_study(study: str) -> Path:
-    """The file of a study: that of the built-in study of this name, else the path itself. Raises BadInput.
-
-    >>> find_study("asymmetry").name
-    'asymmetry.toml'
-    """
-    known, path = built_in(), Path(study)
-    if study in known:
-        return known[study]
-    if is_hdf5(path):
-        expected, remedy = "a study file (TOML)", f"wanderlast report {study}, or wanderlast info {study}"
-        raise BadInput("this is an archive of results, not a study", where=study, expected=expected, remedy=remedy)
-    if path.is_file():
-        return path
-    alike = {file.stem: str(file) for file in sorted(path.parent.glob("*.toml"))}  # all have the same ending
-    near = did_you_mean(path.stem, {name: name for name in known} | alike)
-    if path.is_dir():
-        raise BadInput("this is a folder", where=study, expected="a study file (TOML)", remedy=near)
-    if path.suffix or len(path.parts) > 1:
-        raise BadInput("the study file cannot be read: no such file", where=study, remedy=near)
-    what = "no such file, and no built-in study of that name"
-    raise BadInput(what, where=study, expected=f"a path, or one of {', '.join(known)}", remedy=near)
 
 
 def refuse_study(path: Path) -> None:

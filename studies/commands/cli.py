@@ -67,11 +67,12 @@ def check(study: str) -> None:
     import engine
     from engine.kernels.compiling import told_of_compiling
     from results_schema.cores import cores
-    from studies.commands import catalogue, console, screens
+    from studies.commands import console, screens
     from studies.commands.preview import preview
+    from studies.protocol.library import find_study
     from studies.protocol.study import kind_of
 
-    path = catalogue.find_study(study)
+    path = find_study(study)
     loaded = engine.load(path)
     with told_of_compiling(partial(console.say_compiling, path.stem)) as compiled:
         seen = preview(kind_of(loaded).parts(loaded), cores(), compiled())
@@ -87,10 +88,11 @@ def draw(study: str, folder: Path | None) -> None:
     One self-contained HTML page, before anything is run: a wrong support, unit or node is seen at once.
     """
     import engine
-    from studies.commands import catalogue, console
+    from studies.commands import console
+    from studies.protocol.library import find_study
     from studies.reporting.drawing import write_drawing
 
-    path = catalogue.find_study(study)
+    path = find_study(study)
     console.say(f"wrote {write_drawing(engine.load(path), folder or Path(f'{path.stem}-drawing'))}")
 
 
@@ -278,10 +280,11 @@ def _run(study: str, archive: Path | None, options: RunOptions) -> Outcome:
     with stopping.stop_on_signals() as stop:
         import engine
         from studies.commands import catalogue, console, screens
+        from studies.protocol.library import find_study
         from studies.protocol.listener import Listener
         from studies.runs.runner import run_to_archive
 
-        path = catalogue.find_study(study)
+        path = find_study(study)
         catalogue.refuse_table(archive)
         loaded = engine.load(path)
         with console.progress_bar(path.stem) as bar:

@@ -17,7 +17,7 @@ from results_schema.lazy_imports import xr
 from results_schema.registry import ABSENT, Pieces, by_other_names, lacks, no_row_of
 from results_schema.validate import validate
 from studies.protocol.checksum import VALUES, checksum_of_values
-from studies.protocol.library import by_name
+from studies.protocol.library import find_study
 from studies.protocol.listener import NOBODY, Listener
 from studies.protocol.parts import Foreseen, TextTable, Took, Variants, Work
 from studies.protocol.store import Memory
@@ -300,7 +300,7 @@ def run(study: Study | str | Path, **options: Any) -> xr.Dataset:
     started = time.perf_counter()
     check_options(options, "progress", "chunk")
     check_chunk(options.get("chunk"))
-    study = study_of(by_name(study))
+    study = study_of(find_study(study) if isinstance(study, str) and "\n" not in study else study)
     parts, store = kind_of(study).parts(study), Memory()
     parts.check_memory()
     for remark in parts.remarks:

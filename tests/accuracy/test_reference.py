@@ -30,7 +30,7 @@ from engine.bodies.modal.description import MAX_MODES
 from engine.march.outcome import outcome
 from engine.scene.study import Study
 from results_schema.status import Status
-from studies.commands import catalogue
+from studies.protocol.library import find_study
 from tests.accuracy.passages import OPEN, WEIGHT, only_grid, passages
 from tests.engine.build import beam, cruise, fixed, force, mass, shuttle, study, swing
 from tests.reference import values
@@ -296,7 +296,7 @@ def test_errors_of_what_a_head_beside_the_axis_pushes_are_told() -> None:
     sweep = {"acceleration": {"of": "carriage.head.motion.acceleration", "values": [2.0, 3.0, 4.0, 5.0, 6.0, 7.0]}}
     told, observed = np.zeros(0), np.zeros(0)
     for wanted in (1e-2, 2e-2, 3e-2):
-        given = engine.load(catalogue.find_study("machine-tool"))
+        given = engine.load(find_study("machine-tool"))
         plan = make_plan(given.with_values({"sweep": sweep, "solver.tolerance": wanted}))
         found = audit(plan, np.arange(plan.size))
         tolerance = tolerances(results_of(plan.asked))[:, None]

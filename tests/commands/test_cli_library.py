@@ -8,6 +8,7 @@ import engine
 from engine.scene.sweep import Cases, expand
 from results_schema.errors import BadInput
 from studies.commands import catalogue
+from studies.protocol.library import find_study
 from studies.protocol.parts import Pieces, Variants
 from studies.protocol.study import kind_named, kind_names, kind_of
 from tests.kinds.test_at_rest import COMPARED
@@ -48,7 +49,7 @@ def test_built_in_studies_are_planned_without_a_complaint(name: str) -> None:
         assert plan.seconds < 20.0
     assert not any("?" in remark for remark in parts.remarks)  # whether something is meant
     assert len(study.title) > 10
-    assert catalogue.find_study(name) == BUILT_IN[name]
+    assert find_study(name) == BUILT_IN[name]
 
 
 @pytest.mark.fault(2, 3, 4)
@@ -142,7 +143,7 @@ def test_commented_examples_at_the_end_are_valid_too() -> None:
 
 def test_unknown_names_are_refused_with_the_nearest() -> None:
     with pytest.raises(BadInput, match='did you mean "double-peak"'):
-        catalogue.find_study("doublepeak")
+        find_study("doublepeak")
     with pytest.raises(BadInput, match='did you mean "trajectory"'):
         catalogue.start_text("trajectori")
 

@@ -12,7 +12,7 @@ from engine.scene.study import Study
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity, Status
 from studies.at_rest.findings import frequency_errors, reading_errors
-from studies.commands import catalogue
+from studies.protocol.library import find_study
 from studies.protocol.study import kind_of
 from studies.reporting import answers
 from studies.reporting.summary import ranges
@@ -219,9 +219,7 @@ def test_positions_of_the_unreduced_model(count: int, places: list[float]) -> No
 def test_the_machine_bed_agrees_with_its_full_model() -> None:
     """Coupled frequencies up to the 8th within 0.2 %, static deflections within 0.01 %, at five positions."""
     for name in ("machine-bed-frequencies", "machine-bed-statics"):
-        case = engine.load(catalogue.find_study(name)).with_values(
-            {"question.positions": 5, "question.mode_counts": []}
-        )
+        case = engine.load(find_study(name)).with_values({"question.positions": 5, "question.mode_counts": []})
         found = studies.run(case)
         assert found.unreduced_position.values.tolist() == pytest.approx([0.4, 0.95, 1.5, 2.05, 2.6])
         if "frequency" in found:

@@ -22,6 +22,7 @@ from studies.pictures.common.figures import MUTED
 from studies.pictures.moving_shapes import FRONT, SIDE, SPACE, Piece, moving, view_of
 from studies.pictures.scene import pictures
 from studies.pictures.scene_layout import Layout, in_a_row, layout, starts
+from studies.protocol.library import find_study
 from studies.protocol.study import kind_of
 from studies.reporting.drawing import PAGE, page_of, write_drawing
 from studies.results.formatting import number
@@ -76,21 +77,21 @@ def test_every_study_is_drawn(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.fault(39)
 def test_a_hostile_title_stays_text(tmp_path: Path) -> None:
-    hostile = engine.load(catalogue.find_study("asymmetry")).with_values({"title": HOSTILE})
+    hostile = engine.load(find_study("asymmetry")).with_values({"title": HOSTILE})
     page = write_drawing(hostile, tmp_path).read_text(encoding="utf-8")
     assert HOSTILE in check_standing_alone(page).text
 
 
 def test_bad_places_are_refused_before_anything_is_computed(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    found = engine.load(catalogue.find_study("asymmetry"))
+    found = engine.load(find_study("asymmetry"))
     for folder in (tmp_path / "file", tmp_path / "missing" / "folder"):
         with pytest.raises(BadInput, match="folder"):
             write_drawing(found, folder)
 
 
 def test_studies_that_check_refuses_are_refused(tmp_path: Path) -> None:
-    found = engine.load(catalogue.find_study("machine-bed-frequencies"))
+    found = engine.load(find_study("machine-bed-frequencies"))
     with pytest.raises(BadInput, match="off its body"):
         write_drawing(found.with_values({"question.positions": [-1.0, 1.0]}), tmp_path / "drawing")
     assert not (tmp_path / "drawing").exists()
@@ -109,7 +110,7 @@ def test_outlines_move_as_the_modes(supports: object) -> None:
 
 def test_members_move_as_the_track() -> None:
     """Between the ends of elements too, and along it."""
-    found = engine.load(catalogue.find_study("machine-bed-run"))
+    found = engine.load(find_study("machine-bed-run"))
     body = laid_out(found).bodies["bed"]
     for line in body.outline.lines:
         exact = body.part.modal.shape(line.points[:, 0])

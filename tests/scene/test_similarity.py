@@ -13,7 +13,7 @@ import studies
 from engine.batch.plan import make_plan
 from engine.bodies.frame.frame import MATERIAL
 from engine.scene.study import Study, load
-from studies.commands import catalogue
+from studies.protocol.library import find_study
 from tests.engine.build import aboard, cruise, fixed, force, mass, oscillator, shuttle, steel, study, under
 
 GROWN = {
@@ -142,7 +142,7 @@ def test_what_has_numbers_of_its_own_has_scenes_of_its_own(changes: dict[str, An
 
 def test_a_frame_of_one_material_is_counted_too() -> None:
     """Pushed along and across by a head that brakes beside its axis; one modulus of two sections is one of one."""
-    one = load(catalogue.find_study("machine-tool")).without_sweep()
+    one = load(find_study("machine-tool")).without_sweep()
     one = one.with_values({f"solver.{key}": value for key, value in MARCHED.items()} | {"body.portal.modes": 6})
     keys = {key: [f"body.portal.section.{name}.{key}" for name in ("beam", "column")] for key in MATERIAL}
     values = {"youngs_modulus": [2.1e11, 7e10], "density": [7850.0, 2700.0]}
