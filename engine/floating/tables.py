@@ -9,6 +9,7 @@ import numpy as np
 from engine.floating.attachments import grip_tables, shorter_at, tip_tables
 from engine.floating.bodies.elastic import CELLS
 from engine.floating.bodies.fields import Y, Z
+from engine.floating.sections import missed_sections
 from engine.floating.settling import bands_of
 from engine.kernels.floating import layout as columns
 from engine.kernels.floating.layout import System
@@ -48,6 +49,7 @@ def system_of(model: FloatingModel) -> System:
     loads, tips = list(enumerate(model.loads)), tip_tables(model, n, most)
     (shortening, foreshortening), (points, point_shorter) = _foreshortening(model), _ends(model, n, most)
     grips = [*(load.grip for load in model.loads), *(grip for link in model.links for grip in link)]
+    missed_of, missed, missed_lines, missed_grips = missed_sections(model, grips)
     return System(
         tree,
         numbers,
@@ -71,6 +73,10 @@ def system_of(model: FloatingModel) -> System:
         points,
         point_shorter,
         *_readings(model),
+        missed_of,
+        missed,
+        missed_lines,
+        missed_grips,
         _smooth(model),
         tips.tips,
         tips.places,

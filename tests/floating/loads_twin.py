@@ -145,7 +145,7 @@ TERMS = {
         "add(cross(vector(work.frames, b, SPIN), d), rate)",
         "cross(vector(work.frames, b, SPIN), d)",
     ),
-    "the other end of a spring": ("times(1.0 if p == one else -1.0, own)", "times(1.0 if p == one else 0.0, own)"),
+    "the other end of a spring": ("own if end == 0 else times(-1.0, own)", "own if end == 0 else times(0.0, own)"),
 }
 
 

@@ -23,6 +23,7 @@ from results_schema.errors import BadInput
 if TYPE_CHECKING:
     from engine.bodies.modal.modal_body import Shapes
     from engine.scene.frames import Frame
+    from results_schema.quantities import Quantity
 
 GAUSS = 160  # places of the integrals: exact for products of shapes of up to some 40 half waves
 #: Derivative of a beam's shapes: a rotation's second one, of the carriages' inertia, is the last that counts.
@@ -156,7 +157,15 @@ def elastic_beam(body: Beam, frame: Frame, modes: int | None, where: str, hung: 
         body.build(),
         BeamShortening(along, x, dm),
         bool(frame.stiffening),
+        inertial=_by_inertia,
     )
+
+
+def _by_inertia(body: ElasticBody, quantity: Quantity, x: float) -> Array:
+    """As of `engine.floating.bodies.elastic.Inertial`; section forces jump and bend where they are read."""
+    s, ds = _gauss([0.0, x, body.length])
+    missed = body.missed_at(quantity, x, s) * (body.mass / body.length * ds)
+    return np.array([missed.sum(), -missed @ s, missed @ s])
 
 
 def _gauss(bounds: Sequence[float]) -> tuple[Array, Array]:

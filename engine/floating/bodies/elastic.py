@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -25,6 +25,14 @@ if TYPE_CHECKING:
 CELLS = 256
 
 
+class Inertial(Protocol):
+    """What modes miss at rest of a section force at a place by the inertia of the undeformed body."""
+
+    def __call__(self, body: ElasticBody, quantity: Quantity, x: float) -> Array:
+        """(3,) under forces dm times what places accelerate by, per unit a_z, alpha_y and w_x w_z of the frame."""
+        ...
+
+
 @dataclass(frozen=True, eq=False)
 class ElasticBody:
     """A body with its track along x, N modes of unit modal mass, and G places of its mass.
@@ -33,7 +41,8 @@ class ElasticBody:
     own_inertia (3,): kg m2 that the places do not have. along: what moves along the track. shortening:
     displacements of second order, None where they are not known; stiffens: whether marches have them. modal: the body
     at rest, which knows its section; None of what does not bend. slender: whether it is a beam, which its frame holds
-    where its track begins. rolls: whether its rotation about the track is known.
+    where its track begins. rolls: whether its rotation about the track is known. inertial: what its modes miss of a
+    section force by its own inertia; None where that is not known, or loads at rest do not push across the track.
     """
 
     length: float
@@ -49,6 +58,7 @@ class ElasticBody:
     stiffens: bool = False
     slender: bool = True
     rolls: bool = True
+    inertial: Inertial | None = None
 
     @property
     def shortened(self) -> int:
@@ -67,6 +77,16 @@ class ElasticBody:
             return np.asarray(self.modal.sections.rows(quantity.name, [x])[0])
         fields = self.fields(np.array([x]), (quantity.derivative,))[0, 0, Z]
         return np.asarray(quantity.factor(self.modal) * fields)
+
+    def missed_at(self, quantity: Quantity, x: float, s: Array) -> Array:
+        """(S,) what the modes miss at rest of a section force at x (m) per unit force across the track at s (S,) m."""
+        assert self.modal is not None
+        if self.modal.sections is not None:
+            whole = self.modal.sections.influence_at(quantity.name, np.full_like(s, x), s)
+        else:
+            line = self.modal.influence_at(np.full_like(s, x), s, quantity.derivative)
+            whole = quantity.factor(self.modal) * line
+        return np.asarray(whole - self.fields(s, (0,))[0, :, Z] @ (self.reading(quantity, x) / self.omega**2))
 
     def track(self) -> Array:
         """(cells, 6, 6, N): fields as polynomials, see `engine.kernels.floating.layout`."""

@@ -8,6 +8,10 @@ from engine.kernels.floating.layout import (
     FIRST,
     HEIGHT,
     INERTIA,
+    MISSED_BODY,
+    MISSED_SPUN,
+    MISSED_TURNING,
+    MISSED_UNIFORM,
     MODES,
     ONE,
     ORIGIN,
@@ -32,6 +36,7 @@ from engine.kernels.floating.tracks import (
     TURN_CURVE,
     TURN_SLOPE,
     combined_there,
+    missed_line,
     pulled_nearer,
     shapes_at,
 )
@@ -201,6 +206,22 @@ def attitude(system, lane, c, along, x, work):
     whole, whole_change = add(w, own), add(add(vector(work.frames, b, ANGULAR), own_change), cross(w, own))
     torque = add(inertia_times(E, lane, c, whole_change), cross(whole, inertia_times(E, lane, c, whole)))
     return own, own_change, arm, torque
+
+
+@called
+def missed_section(system, k, x, work):
+    """What the modes of a body miss of a section force: by its carriages' forces across the track, and by its own
+    inertia and weight as its frame moves, which at a place x of the track accelerates by a_z + x (w_x w_z - al_y)."""
+    b = system.missed_sections[k, MISSED_BODY]
+    found = -1.0 * system.missed[k, MISSED_UNIFORM] * vector(work.frames, b, ACCELERATION)[2]
+    if not system.tree[b, RESTS]:
+        w, al = vector(work.frames, b, SPIN), vector(work.frames, b, ANGULAR)
+        found = found - system.missed[k, MISSED_TURNING] * al[1] - system.missed[k, MISSED_SPUN] * w[0] * w[2]
+    for c in range(system.riders.shape[0]):
+        if system.riders[c, RIDDEN] == b:
+            s, _, _ = ridden(system, c, x, work)
+            found = found - lanes_at(work.contacts, (c, CONTACT + 2)) * missed_line(system, k, s, work.gathered)
+    return found
 
 
 @called

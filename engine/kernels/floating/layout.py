@@ -45,6 +45,10 @@ OWN_MASS, INERTIA, HEIGHT, SPRUNG_MASS, SPRING, DAMPER, DRIVE, VISCOUS, COULOMB,
 WEIGHT, ARM, GRIPS = 0, 1, 4
 PUSHED, TWISTED, GRIP_MODE = 0, 3, 6
 GRIP, IN_BODY, COURSE = 0, 1, 2
+# columns of System.missed_sections: the reading, and its body; of System.missed: its place, and what is missed per unit
+# a_z, alpha_y and w_x w_z of the body's frame
+MISSED_READING, MISSED_BODY = 0, 1
+MISSED_PLACE, MISSED_UNIFORM, MISSED_TURNING, MISSED_SPUN, MISSED = 0, 1, 2, 3, 4
 # columns of System.shortening
 SHORTER, AXIS, ONE, OTHER = 0, 1, 2, 3
 # columns of System.smooth: the signal, and whether it is its square that is smooth
@@ -72,8 +76,10 @@ class System(NamedTuple):
     points (P, 3 + 3 n), pointed (P): places whose position over the ground is observed, and their bodies;
     point_shorter (P, A, n, n): G there.
     readings (S, N): of sensors, per coordinate; read_under (S, 3): the carriage under which one reads, or -1; the
-    component that it reads there; 0, 1 or 2 for coordinates, velocities or accelerations. smooth (K, 2): signals that
-    have extremes between stations.
+    component that it reads there; 0, 1 or 2 for coordinates, velocities or accelerations. missed_sections (K, 2),
+    missed (K, MISSED): readings of section forces, and what their modes miss; missed_lines (K, 2, cells, 4): that by a
+    unit force across the track, in equal cells before and beyond the place; missed_grips (K, P): that at grips, times
+    weight. smooth (K, 2): signals that have extremes between stations.
     tips (T, 2), tip_places (T, 6 + 3 n): places whose distance from the rigid arm is read; tip_shorter (T, A, n, n): G
     there; carrying (L): the bodies of these arms, each after its parent. bands (T, K), m: of each tip, within which it
     is told when what is left after a stop stays; none where no study asks.
@@ -106,6 +112,10 @@ class System(NamedTuple):
     point_shorter: FloatArray
     readings: FloatArray
     read_under: IntArray
+    missed_sections: IntArray
+    missed: FloatArray
+    missed_lines: FloatArray
+    missed_grips: FloatArray
     smooth: IntArray
     tips: IntArray
     tip_places: FloatArray

@@ -10,6 +10,7 @@ from engine.kernels.floating.layout import (
     FIRST,
     GRIP,
     IN_BODY,
+    MISSED_BODY,
     MODES,
     PUSHED,
     SHORTENED,
@@ -33,7 +34,7 @@ from engine.kernels.floating.vectors import (
 )
 from engine.kernels.floating.work import ATTITUDE, FORCE, POSITION, SPIN, TORQUE, VELOCITY, add_to
 from engine.kernels.jit import called
-from engine.kernels.vector import choose, lanes_at, root
+from engine.kernels.vector import all_lanes, choose, lanes_at, root
 
 
 @called
@@ -99,16 +100,38 @@ def arm(system, p, x):
 @called
 def link_forces(system, lane, k, x, work, out):
     """A spring and a damper between two grips, along the line between them."""
-    one, other = system.links[k, 0], system.links[k, 1]
+    for end in range(2):
+        p = system.links[k, end]
+        if system.gripped[p] >= 0:
+            push(system, p, pull_at(system, lane, k, end, x, work), x, work, out)
+
+
+@called
+def pull_at(system, lane, k, end, x, work):
+    """The force of a spring and its damper on the body at one of its ends, in the axes of that."""
     d, e, drift = between(system, k, x, work)
     length = root(dot(d, d))
     pull = lanes_at(lane.links, (k, 0)) * (length - lanes_at(lane.links, (k, 2)))
     f = times(pull + lanes_at(lane.links, (k, 1)) * dot(e, drift), e)
-    for p in (one, other):
-        b = system.gripped[p]
-        if b >= 0:
-            own = turned_in(matrix(work.frames, b, ATTITUDE), f)
-            push(system, p, times(1.0 if p == one else -1.0, own), x, work, out)
+    own = turned_in(matrix(work.frames, system.gripped[system.links[k, end]], ATTITUDE), f)
+    return own if end == 0 else times(-1.0, own)
+
+
+@called
+def missed_by_loads(system, lane, k, x, work):
+    """What the modes of a body miss of a section force by loads and by springs across its track."""
+    b, found = system.missed_sections[k, MISSED_BODY], all_lanes(0.0)
+    for q in range(system.load_table.shape[0]):
+        p = system.load_table[q, GRIP]
+        if system.gripped[p] == b:
+            f, _ = load_at(system, lane, q, work)
+            found = found + system.missed_grips[k, p] * f[2]
+    for one in range(system.links.shape[0]):
+        for end in range(2):
+            p = system.links[one, end]
+            if system.gripped[p] == b:
+                found = found + system.missed_grips[k, p] * pull_at(system, lane, one, end, x, work)[2]
+    return found
 
 
 @called

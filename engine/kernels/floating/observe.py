@@ -4,7 +4,7 @@ momentum."""
 import numpy as np
 
 from engine.kernels.floating.bodies import second_moments
-from engine.kernels.floating.carriages import carried, has_attitude, inertia_times, ridden
+from engine.kernels.floating.carriages import carried, has_attitude, inertia_times, missed_section, ridden
 from engine.kernels.floating.following import follow_rigid
 from engine.kernels.floating.layout import (
     COORDINATE,
@@ -13,6 +13,7 @@ from engine.kernels.floating.layout import (
     LARGEST,
     LARGEST_AT,
     MASS,
+    MISSED_READING,
     MODES,
     MOMENT,
     MOTION,
@@ -37,7 +38,7 @@ from engine.kernels.floating.layout import (
     TIP_WAY,
     TRANSLATION,
 )
-from engine.kernels.floating.loads import between
+from engine.kernels.floating.loads import between, missed_by_loads
 from engine.kernels.floating.state import put_where
 from engine.kernels.floating.tracks import (
     SHAPE,
@@ -96,6 +97,9 @@ def observe(system, lane, x, work, by, out):
     first = system.read_under.shape[0]
     for r in range(first):
         read(system, r, x, work, out)
+    for k in range(system.missed_sections.shape[0]):
+        missed = missed_section(system, k, x, work) + missed_by_loads(system, lane, k, x, work)
+        add_to(out, system.missed_sections[k, MISSED_READING], missed)
     for c in range(system.riders.shape[0]):
         carriage(system, lane, c, x, work, out, first)
         first += OF_CARRIAGE

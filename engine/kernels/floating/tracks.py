@@ -1,6 +1,6 @@
 """Shapes of a body at places of its track that depend on the state, from polynomials in cells."""
 
-from engine.kernels.floating.layout import AXIS, FIRST, LENGTH, MODES, SHORTENED
+from engine.kernels.floating.layout import AXIS, FIRST, LENGTH, MISSED_BODY, MISSED_PLACE, MODES, SHORTENED
 from engine.kernels.jit import called
 from engine.kernels.layout import LANES
 from engine.kernels.vector import all_lanes, lanes_at, put_lanes
@@ -50,6 +50,25 @@ def shapes_at(system, b, s, components, work):
             put_lanes(work.modes, (i, k), shape)
             put_lanes(work.modes, (i, k + SLOPE), slope)
             put_lanes(work.modes, (i, k + CURVE), curve)
+
+
+@called
+def missed_line(system, k, s, gathered):
+    """What the modes miss of a section force by a unit force at places s of the track."""
+    place, length = system.missed[k, MISSED_PLACE], system.bodies[system.missed_sections[k, MISSED_BODY], LENGTH]
+    count = system.missed_lines.shape[2]
+    put_lanes(gathered, (AT,), s)
+    for j in range(LANES):
+        at = gathered[AT, j]
+        before = place > 0.0 and (at < place or place >= length)
+        side, low, width = (0, 0.0, place / count) if before else (1, place, (length - place) / count)
+        part = (at - low) / width
+        cell = int(min(part if part > 0.0 else 0.0, count - 1.0))  # NaN too
+        y, found = 2.0 * (part - cell) - 1.0, 0.0
+        for power in range(system.missed_lines.shape[3] - 1, -1, -1):
+            found = found * y + system.missed_lines[k, side, cell, power]
+        gathered[0, j] = found
+    return lanes_at(gathered, (0,))
 
 
 @called
