@@ -71,9 +71,9 @@ class LaneTable:
     inverse_modal_mass (blocks, N, LANES): 1, 1/m (1/kg) of sprung masses, and 0 of what nothing moves;  mass, weight
     (blocks, ties, LANES): of the carriages, zero for dampers and springs, mass only what touches the body and has
     inertia;  joint (blocks, ties, LANES): 1 for rigid joints;  damper, spring (blocks, ties, LANES): N s/m and N/m,
-    zero for carriages;  pulse (blocks, ties, LANES): N, amplitudes of forces that pulsate;  phase (blocks, these
-    forces, LANES): rad;  of_carriages (blocks, carriages, LANES): N, their weights alone;  time_scale, gravity
-    (blocks, LANES).
+    zero for carriages;  pulse (blocks, ties, LANES): N, amplitudes of forces that pulsate;  phase (blocks, P,
+    LANES): rad, of what they swing by;  of_carriages (blocks, carriages, LANES): N, their weights alone;
+    time_scale, gravity (blocks, LANES).
     """
 
     omega: Array
@@ -148,16 +148,17 @@ def lane_table(model: SceneModel, values: VariantValues) -> LaneTable:
 
 
 def _frequencies(model: SceneModel, values: VariantValues) -> Array:
-    """(N, 1) rad/s of all coordinates, or (blocks, N, LANES) with those of the forces that pulsate."""
+    """(N, 1) rad/s of all coordinates, or (blocks, N, LANES) with those of what forces that pulsate swing by."""
     if not model.pulsating:
         return model.omega[:, None]
     found = np.repeat(model.omega[:, None], values.size, axis=1)
-    found[model.pulses] = [values.pulsation(model.carriages[number].name)[1] for number in model.pulsating]
+    for number, pulse in model.pulsating.items():
+        found[model.pulses.start + pulse] = values.pulsation(model.carriages[number].name)[1]
     return to_blocks(found)
 
 
 def _inverse_modal_mass(model: SceneModel, values: VariantValues) -> Array:
-    """(N, V) 1, 1/m of sprung masses, and 0 of forces that pulsate: nothing moves their coordinates."""
+    """(N, V) 1, 1/m of sprung masses, and 0 of what forces that pulsate swing by: nothing moves their coordinates."""
     found = np.ones((model.omega.size, values.size))
     for spring in model.sprung:
         found[spring.mode] = 1.0 / values.column(spring.keys.mass)
@@ -174,10 +175,13 @@ def _pulses(model: SceneModel, values: VariantValues) -> Array:
 
 
 def _phases(model: SceneModel, values: VariantValues) -> Array:
-    """(blocks, P, LANES) rad of the forces that pulsate."""
+    """(blocks, P, LANES) rad of what forces that pulsate swing by."""
     if not model.pulsating:
         return np.zeros((values.size // LANES, 0, LANES))
-    return to_blocks(np.stack([values.pulsation(model.carriages[number].name)[2] for number in model.pulsating]))
+    found = np.zeros((model.pulses.stop - model.pulses.start, values.size))
+    for number, pulse in model.pulsating.items():
+        found[pulse] = values.pulsation(model.carriages[number].name)[2]
+    return to_blocks(found)
 
 
 def _more_damping(model: SceneModel, tie: int) -> float:

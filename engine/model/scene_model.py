@@ -18,6 +18,7 @@ from engine.model.refusals import check_rigid_modes
 from engine.model.rider import Rider
 from engine.model.support_reactions import Place, stand
 from engine.model.ties import CarriageTie, DamperTie, Load, PushTie, SpringTie
+from engine.scene.trains import in_step
 from engine.scene.variants import SpringKeys, in_use, keys_of_carriage
 from results_schema.arrays import Array, Counts, Mask
 from results_schema.errors import BadInput
@@ -82,7 +83,7 @@ class SceneModel:
         """(N,) natural frequencies of all bodies, rad/s, 0 for every sprung mass, those of residual coordinates, which
         are the highest kept and ask for no smaller steps, 0 for pulsating forces, whose frequency is the variant's, and
         0 for the coordinate that stays 1, which is there where something pushes along its track."""
-        sprung, others = np.zeros(len(self.sprung)), np.zeros(len(self.pulsating) + self.has_constant)
+        sprung, others = np.zeros(len(self.sprung)), np.zeros(self.pulses.stop - self.pulses.start + self.has_constant)
         bodies = (part.modal.omega for part in self.bodies)
         residual = [self.bodies[body].modal.omega[-1] for body in self.corrected_bodies]
         return np.concatenate([*bodies, sprung, residual, others])
@@ -112,15 +113,16 @@ class SceneModel:
         first = self.body_modes + len(self.sprung)
         return slice(first, first + self.corrected.size)
 
-    @property
-    def pulsating(self) -> list[int]:
-        """Numbers of the carriages whose force pulsates."""
-        return [number for number, carriage in enumerate(self.carriages) if carriage.pulsates]
+    @cached_property
+    def pulsating(self) -> dict[int, int]:
+        """By numbers of the carriages whose force pulsates, which of the coordinates of `pulses` it swings by."""
+        names = list(dict.fromkeys(carriage.pulse for carriage in self.carriages if carriage.pulsates))
+        return {n: names.index(carriage.pulse) for n, carriage in enumerate(self.carriages) if carriage.pulsates}
 
     @property
     def pulses(self) -> slice:
         """Their coordinates among all: oscillators that nothing holds back, z'' + Omega^2 z = 0, of amplitude 1."""
-        return slice(self.residuals.stop, self.residuals.stop + len(self.pulsating))
+        return slice(self.residuals.stop, self.residuals.stop + 1 + max(self.pulsating.values(), default=-1))
 
     @property
     def sprung(self) -> tuple[SpringTie, ...]:
@@ -284,7 +286,8 @@ def build_model(
         body = used.index(carriage.on)
         rider = Rider(carriage.motion, parts[body].modal.length, paces.get(name, 1.0), delays.get(name, 0.0))
         own = _inertia(study, numerics, name, swept), (Load(number, 1.0, body),)
-        carriages.append(CarriageTie(name, body, rider, *own, pulsates=carriage.pulsates))
+        pulse = in_step(study, name, swept) if carriage.pulsates else ""
+        carriages.append(CarriageTie(name, body, rider, *own, pulse=pulse))
     dampers = [
         DamperTie(number, at, key)
         for number, name in enumerate(used)

@@ -57,7 +57,7 @@ class CarriageTie:
 
     loads: what carries its weight on level ground: itself but for a body on its contacts.
     rides: number of the body that rides, with its mass (kg) and the place of its own track that the motion moves (m).
-    pulsates: whether its force swings in time.
+    pulse: what its force swings in time by, a name that it shares with those that swing in step with it; "" of others.
     """
 
     name: str
@@ -68,7 +68,12 @@ class CarriageTie:
     rides: int | None = None
     own_mass: float = 0.0
     reference: float = 0.0
-    pulsates: bool = False
+    pulse: str = ""
+
+    @property
+    def pulsates(self) -> bool:
+        """Whether its force swings in time."""
+        return bool(self.pulse)
 
     @property
     def attachments(self) -> tuple[Attachment, ...]:

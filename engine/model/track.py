@@ -98,7 +98,7 @@ def tie_rows(model: SceneModel, along: Along, ties: Counts, missed: Array | None
                 under = _sag_under(model, spring, model.attachments[r][0], along)
                 drive[:, place], level[:, place] = np.where(along[spring.rider].on, under, 0.0)
         elif r in model.pulsating:
-            rows[:, model.pulses.start + model.pulsating.index(r), place, CURVE] = along[r].on
+            rows[:, model.pulses.start + model.pulsating[r], place, CURVE] = along[r].on
         elif r < len(model.carriages) and along[r].active and model.carriages[r].inertia == "mass":
             drive[:, place] = _curved_sag(model, model.carriages[r].attachments[0], along)
     if np.isin(ties, model.corrected).any():

@@ -18,6 +18,7 @@ from engine.study_file.refusals import bad_input
 from engine.study_file.spec import nearest
 from results_schema.errors import BadInput, shortened
 
+AT_ONE_FREQUENCY = "pulsation.frequency"  # of the forces of a train
 CHECKED_ONE_BY_ONE = 1000  # longer lists of plain numbers are checked at their ends: every field's limits are intervals
 SOBOL_SEED = 0
 DRAWN_AT_ONCE = 2**20
@@ -140,7 +141,9 @@ def check_targets(study: Study, name: str, axis: SweepAxis) -> None:
                 here, what, expected="the key of a number", received=shortened(path), remedy=remedy
             )
         if axle := _axle_that_would_leave(study, path):
-            what, remedy = "an axle moves with its train", f'of = "{axle}" moves all axles'
+            swings = axle.endswith(AT_ONE_FREQUENCY)
+            what = "the forces of a train pulsate at one frequency" if swings else "an axle moves with its train"
+            remedy = f'of = "{axle}" {"is that of" if swings else "moves"} all axles'
             raise study.source.fault(here, what, expected="a number of the train", received=path, remedy=remedy)
         if not study.targets(path):
             raise study.source.fault(
@@ -183,10 +186,10 @@ def _of_list(study: Study, path: str) -> str:
 
 
 def _axle_that_would_leave(study: Study, path: str) -> str:
-    """The key of a train whose axle alone a key would move otherwise, "" where it does not."""
+    """The key of a train whose axle alone a key would move or swing otherwise, "" where it does not."""
     table, _, rest = path.partition(".")
     name, _, key = rest.partition(".")
-    if table != "carriage" or name not in study.axles or not key.startswith(("motion", "headway")):
+    if table != "carriage" or name not in study.axles or not key.startswith(("motion", "headway", AT_ONE_FREQUENCY)):
         return ""
     return f"train.{study.axles[name]}.{key.replace('headway', 'spacing')}"
 

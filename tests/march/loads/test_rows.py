@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import studies
+from engine.model.scene_model import build_model
 from engine.scene.study import Study
 from results_schema.errors import BadInput
 from results_schema.status import Status
@@ -49,6 +50,47 @@ def paces(*keys: str) -> dict[str, Any]:
 def test_each_has_an_amplitude_and_a_phase_of_its_own_and_all_one_frequency() -> None:
     keys = [f"carriage.group_{n}.pulsation.frequency" for n in (1, 2, 3)]
     same(row(PULSATION, **paces("train.group.pulsation.frequency")), alone(**paces(*keys)))
+
+
+IN_STEP = {"amplitude": AMPLITUDES, "frequency": 1.2, "phase": 0.7}
+
+
+def coordinates(given: Study, *swept: str) -> int:
+    """How many forces that pulsate swing by."""
+    pulses = build_model(given, {}, {}, swept).pulses
+    return pulses.stop - pulses.start
+
+
+def test_those_that_swing_in_step_share_a_coordinate() -> None:
+    """And each of them has the force of one alone."""
+    audited = {"solver": {"audit": 0}, "output": {"histories": "all"}}
+    apart = row(IN_STEP | {"phase": [0.7, 0.7 + 2.0 * np.pi, 0.7 - 2.0 * np.pi]}, **audited)
+    assert [coordinates(one) for one in (row(IN_STEP), apart, row(PULSATION))] == [1, 3, 3]
+    one, other = (studies.run(given)["midspan"] for given in (row(IN_STEP, **audited), apart))
+    np.testing.assert_allclose(one, other, rtol=0, atol=1e-10 * float(np.abs(other).max()))
+
+
+@pytest.mark.parametrize("number", ["frequency", "amplitude", "amplitude.1"])
+def test_what_is_swept_of_all_leaves_them_in_step(number: str) -> None:
+    keys = list(row(IN_STEP).targets(f"train.group.pulsation.{number}"))
+    assert coordinates(row(IN_STEP), *keys) == 1
+
+
+def test_phases_that_are_swept_are_each_their_own() -> None:
+    """Each alone, beside one that is written."""
+    key = "carriage.group_2.pulsation.phase"
+    assert coordinates(row(IN_STEP), key) == 3
+    sweep = {"later": {"of": key, "values": [0.7, 2.0]}}
+    found = studies.run(row(IN_STEP, sweep=sweep, solver={"audit": 0}))["midspan_max"]
+    written = studies.run(row(IN_STEP | {"phase": [0.7, 2.0, 0.7]}, solver={"audit": 0}))["midspan_max"]
+    assert float(found[1]) == pytest.approx(float(written), rel=2e-3) and abs(float(found[1] / found[0]) - 1.0) > 0.01
+
+
+def test_no_force_of_a_row_pulsates_at_a_frequency_of_its_own() -> None:
+    with pytest.raises(
+        BadInput, match=r'pulsate at one frequency.*of = "train.group.pulsation.frequency" is that of all'
+    ):
+        studies.run(row(IN_STEP, sweep={"pace": {"of": "carriage.group_2.pulsation.frequency", "values": [1.0, 2.0]}}))
 
 
 def test_the_scale_of_loads_multiplies_amplitudes_too() -> None:
