@@ -280,6 +280,11 @@ class SideSensor(Sensor):
         body = model.bodies[self.body].modal
         return np.asarray(along[self.under].shapes(body, derivative, self.direction)[derivative])
 
+    def largest_influence(self, model: SceneModel, places: Array) -> float:
+        """By a force in its own direction too: loads may move it by inertia alone."""
+        own = self._modal(model).flexibility_between(places, places, (self.direction, self.direction))
+        return max(super().largest_influence(model, places), float(np.abs(own).max()))
+
     def _full(self, model: SceneModel, along: Along, attachment: Attachment) -> Array:
         modal, loaded, x = self._modal(model), place(attachment, along), self.places(along)
         if isinstance(loaded, str):
