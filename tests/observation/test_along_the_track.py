@@ -178,8 +178,8 @@ def test_beams_do_not_move_so() -> None:
 
 
 def test_what_inertia_alone_moves_across_the_track_has_not_diverged() -> None:
-    """At rest no load in the plane of a portal moves it across. A mass beside that plane does so while it swings, and of
-    a body out of files, whose flexibility is 0 there but for 1e-24, all that was said to have left the finite numbers."""
+    """At rest no load in the plane of a portal moves it across. A mass beside that plane does so while it swings; of a
+    body out of files, whose flexibility is 0 there but for 1e-24, that was said to have left the finite numbers."""
     given = study({"sway": ACROSS}, in_space(), carriage={"car": mass(4.0, cruise(0.0, SPAN, 6.0)) | {"on": "portal"}})
     model, places = base_scene(given), np.linspace(0.2, SPAN, 9)
     modal, sway = model.bodies[0].modal, build_sensors(model)[0]
