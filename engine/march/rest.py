@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from engine.scene.variants import VariantValues
 
 # What is said of the next four was measured on a girder whose trolley's load hangs on a rope, and on a portal's head.
+SWINGS = 2.0  # that may come together, each as large as what is seen of them
 BEATS = 2.0  # that have to be seen: after one 3.1 s were told where 4.5 are true
 #: Modes of the scene whose periods and beats count: 3 to 8 told the same; and of each body that tell them, with static
 #: correction: their frequencies were within 6e-4 of those of 64.
@@ -84,26 +85,31 @@ def settling_times(tables: SceneTables, values: VariantValues, counts: Counts, h
     return found
 
 
-class _Rest(NamedTuple):
-    """A sensor at rest: by how much it is off its static value (H, V) and seconds since the stop (H, V), when that is
-    and the longest swing (V,), and its band."""
+class Rest(NamedTuple):
+    """A sensor at rest: by how much it is off its static value (H, V) and seconds since the stop (H, V), when that is,
+    the longest period and the longest swing (V,), and its band."""
 
     sensor: str
     off: Array
     seconds: Array
     begins: Array
+    period: Array
     longest: Array
     band: float
 
     def settled_within(self, parts: Array) -> Array:
-        """(B, V) s after the stop: when it has settled within parts (B,) of its band."""
-        bands = parts * self.band
-        when = last_beyond(self.off, bands, self.seconds)
-        may_swing = np.fmax.reduce(self.off, axis=0) > STILL * bands[:, None]
+        """(B, V) s after the stop: when it has settled within parts (B,) of its band. What has not left it for a period
+        grows by a beat to no more than the sine of the part of it that is seen lets."""
+        bands = (parts * self.band)[:, None]
+        when, largest = last_beyond(self.off, bands[:, 0], self.seconds), np.fmax.reduce(self.off, axis=0)
+        with np.errstate(divide="ignore"):
+            grown = np.sin(np.pi * np.minimum(0.5, self.seconds[-1] / self.longest))
+        leaves = (self.seconds[-1] < self.period) | (SWINGS * largest > grown * bands)
+        may_swing = (largest > STILL * bands) & ((when > 0.0) | np.isnan(when) | leaves)
         return np.where(may_swing & (self.seconds[-1] - when < self.longest), np.nan, when)
 
 
-def _rests(tables: SceneTables, values: VariantValues, counts: Counts, history: Array) -> Iterator[_Rest]:
+def _rests(tables: SceneTables, values: VariantValues, counts: Counts, history: Array) -> Iterator[Rest]:
     """The sensors of which it is told how long they take to settle; history (H, J, V) at stations by their count."""
     own = counts_settling(tables)
     if not own.size:
@@ -115,20 +121,21 @@ def _rests(tables: SceneTables, values: VariantValues, counts: Counts, history: 
         band = tables.model.study.sensor[name].settling_band
         if band is not None:
             off = np.abs(readings[:, j] - static)
-            longest = _longest_swing(modes, sensors[j].reads_whole.loose(model, along)[-1])
-            yield _Rest(name, off, seconds - seconds[0], seconds[0], longest, band)
+            longest = _longest_swings(modes, sensors[j].reads_whole.loose(model, along)[-1])
+            yield Rest(name, off, seconds - seconds[0], seconds[0], *longest, band)
 
 
-def _longest_swing(modes: CoupledModes, row: Array) -> Array:
-    """(V,) s: the longest period of what a sensor's row (N,) reads of the lowest modes of the scene with its carriages
-    where they rest, or of two beats of neighbours among these; 0 where it reads none."""
+def _longest_swings(modes: CoupledModes, row: Array) -> tuple[Array, Array]:
+    """(V,) s twice: the longest period of what a sensor's row (N,) reads of the lowest modes of the scene with its
+    carriages where they rest, and that or two beats of neighbours among these; 0 where it reads none."""
     omega, shapes = modes
     read = np.abs(np.einsum("n,vnk->vk", row, np.nan_to_num(shapes[:, 0])))
     own = np.where(read > READ * read.max(axis=1, keepdims=True), omega[:, 0], np.nan)
     ordered = np.sort(own, axis=1)  # NaN at the end
     beats = np.diff(ordered, axis=1)
     slowest = np.concatenate([own, np.where(beats > ALIKE * ordered[:, 1:], beats / BEATS, np.nan)], axis=1)
-    return np.asarray(2.0 * np.pi / np.fmin.reduce(slowest, axis=1, initial=np.inf))
+    period, longest = (2.0 * np.pi / np.fmin.reduce(some, axis=1, initial=np.inf) for some in (own, slowest))
+    return period, longest
 
 
 @lru_cache(maxsize=32)

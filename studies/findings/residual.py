@@ -249,7 +249,9 @@ def told_settling(results: Results, sensor: str, limit: float | None, axis: Axis
     if band is None:
         return []
     values = settling_of(results, names_of_times(sensor)[0])
-    left = int(np.count_nonzero(results.with_values & np.isnan(values)))
+    unknown = results.with_values & np.isnan(values)
+    quiet = unknown & _never_out(results, sensor, band)
+    left = int(np.count_nonzero(unknown))
     place, units, said = extreme(values), results.sensors[sensor], list[str]()
     known = int(np.count_nonzero(np.isfinite(values)))
     within = f"within {quantity(band, units)} of its static value"
@@ -262,19 +264,30 @@ def told_settling(results: Results, sensor: str, limit: float | None, axis: Axis
         when = f"{quantity(took, 's')}{told_error(error, took, 's')} after {since(results)} at the latest"
         said.append(f"{among}it has settled {within} {when}{in_words(results, place)}")
     if limit is not None:
-        longer = where_beyond(results, np.where(np.isnan(values), np.inf, values), limit, axis)
+        longer = where_beyond(results, np.where(unknown & ~quiet, np.inf, values), limit, axis)
         said.append(f"it takes longer than {quantity(limit, 's')} {longer}")
-    if left:
-        said.append(_not_settled(results, results.with_values & np.isnan(values), axis))
+    if (out := unknown & ~quiet).any():
+        have = f"{counted(int(out.sum()), 'variant')} {'have' if out.sum() > 1 else 'has'} not settled by the end"
+        said.append(f"{have} of the run{_over(results, out, axis)}: a longer rest tells when")
+    if quiet.any():
+        stay = f"{counted(int(quiet.sum()), 'variant')} {'stay' if quiet.sum() > 1 else 'stays'} {within}"
+        said.append(f"{stay}{_over(results, quiet, axis)}, but the rest is too short to tell that it is for good")
     return said
 
 
-def _not_settled(results: Results, left: Mask, axis: Axis | None) -> str:
-    """How many variants have not settled by the end of their runs, and which these are."""
-    have = f"{counted(int(left.sum()), 'variant')} {'have' if left.sum() > 1 else 'has'}"
+def _never_out(results: Results, sensor: str, band: float) -> Mask:
+    """Whether what is seen of a sensor after the stop stays within its band, in the sweep's shape; nowhere where that
+    is not told."""
+    name = f"{sensor}_residual"
+    if name not in results.dataset:
+        return np.zeros(results.with_values.shape, dtype=np.bool_)
+    return np.asarray(settling_of(results, name) <= band)
+
+
+def _over(results: Results, which: Mask, axis: Axis | None) -> str:
+    """Along which values of a swept number variants are such."""
     along = axis is not None and axis.dim != VARIANT
-    where = f", over {axis.noun} {where_beyond(results, left.astype(float), 0.5, axis)}" if axis and along else ""
-    return f"{have} not settled by the end of the run{where}: a longer rest tells when"
+    return f", over {axis.noun} {where_beyond(results, which.astype(float), 0.5, axis)}" if axis and along else ""
 
 
 def _shortest(results: Results, sensors: Sequence[str]) -> str:
