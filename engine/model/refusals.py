@@ -15,7 +15,8 @@ FRAMES = ("moving-frames", "sliding-mass")  # kinds of study in which bodies mov
 
 
 def check_stands(study: Study) -> None:
-    """Refuse what belongs to bodies whose frames move, and carriages that slide by themselves. Raises BadInput."""
+    """Refuse what belongs to bodies whose frames move, and carriages that slide or turn by themselves. Raises
+    BadInput."""
     movers = [f"frame.{name}" for name in study.frame]
     movers += [f"{table}.{name}" for table in ("load", "spring") for name in getattr(study, table)]
     movers += [f"carriage.{name}.motion" for name, carriage in study.carriage.items() if carriage.motion.slides]
@@ -25,6 +26,15 @@ def check_stands(study: Study) -> None:
     if movers:
         what = f"in studies of the kind {study.kind} bodies stand, and carriages go where they are told"
         raise study.source.fault(movers[0], what, expected=f'kind = "{FRAMES[0]}"')
+    swept = {key for axis in study.sweep.axes.values() for key in axis.of}
+    for name, carriage in study.carriage.items():
+        own = (
+            key for key in carriage.in_frames_that_move if getattr(carriage, key) or f"carriage.{name}.{key}" in swept
+        )
+        for key in own:
+            what = f"in studies of the kind {study.kind} a mass does not turn with its track"
+            remedy = f'a body on contacts has an inertia; kind = "{FRAMES[0]}"'
+            raise study.source.fault(f"carriage.{name}.{key}", what, expected="left out", remedy=remedy)
     for name, sensor in study.sensor.items():
         if sensor.reads.of_arm or sensor.reads.of_drive:
             what = f"in studies of the kind {study.kind} bodies stand: no joints carry an arm"

@@ -50,10 +50,12 @@ class Carriage(SpecOfKind):
     on: name of the body. delay: s after time 0 at which it sets off, 0 if not given.
     headway: the metres of its own way by which it trails a carriage that sets off then.
     masses: keys that hold parts of its mass in kg; touching: of these, what touches the track; forces: keys in N.
-    may_push: directions beside that of its loads in which its inertia may act.
+    may_push: directions beside that of its loads in which its inertia may act. in_frames_that_move: keys that count
+    there alone.
     """
 
     masses: ClassVar[tuple[str, ...]] = ()
+    in_frames_that_move: ClassVar[tuple[str, ...]] = ()
     touching: ClassVar[tuple[str, ...]] = ()
     forces: ClassVar[tuple[str, ...]] = ()
     may_push: ClassVar[tuple[Direction, ...]] = ()
@@ -239,6 +241,7 @@ class MassCarriage(PushingCarriage):
 
     masses: ClassVar[tuple[str, ...]] = ("mass",)
     touching: ClassVar[tuple[str, ...]] = ("mass",)
+    in_frames_that_move: ClassVar[tuple[str, ...]] = ("inertia", "height")
 
     kind: Literal["mass"]
     mass: Mass = Field(gt=0)

@@ -10,6 +10,8 @@ from engine.scene.carriages import CARRIAGES, Carriage
 from engine.study_file.units import Force, Mass
 from engine.unreduced.scene import unreduced_model
 from engine.unreduced.statics import unreduced_frequencies, unreduced_statics
+from results_schema.errors import BadInput
+from studies.protocol.study import kind_of
 from tests.engine.build import beam, cruise, fixed, force, mass, study
 
 WAY = cruise(0.0, 1.0, 0.5)
@@ -43,3 +45,20 @@ def test_a_kind_from_elsewhere_is_a_mass_and_a_force(monkeypatch: pytest.MonkeyP
     np.testing.assert_allclose(unreduced_statics(whole, [0.4])[0], together, rtol=1e-12)
     alone = unreduced_frequencies(unreduced_model(study(beam(), {"car": mass(0.3, WAY)}, **options)), [0.4], 3)
     np.testing.assert_allclose(unreduced_frequencies(whole, [0.4], 3), alone, rtol=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["passage", "eigenfrequencies", "trajectory"])
+@pytest.mark.parametrize(
+    ("key", "more"),
+    [
+        ("inertia", {"inertia": [1.0, 2.0, 3.0]}),
+        ("height", {"height": 0.3}),
+        ("height", {}),
+    ],
+)
+def test_masses_turn_in_frames_that_move_alone(kind: str, key: str, more: dict[str, object]) -> None:
+    """Where bodies stand both keys did nothing, without a word."""
+    sweep = {} if more else {"sweep": {"low": {"of": "carriage.car.height", "values": [0.0, 0.3]}}}
+    given = study(beam(), {"car": mass(0.3, WAY) | more}, kind=kind, sensor={"place": fixed(0.6)}, **sweep)
+    with pytest.raises(BadInput, match=rf"carriage\.car\.{key}: in studies of the kind {kind} a mass does not turn"):
+        kind_of(given).parts(given)
