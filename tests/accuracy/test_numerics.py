@@ -56,11 +56,13 @@ def test_modes_of_a_frame_are_as_many_as_it_has() -> None:
     assert [modes_of(found.with_more_modes(times)) for times in (1, 2, 16)] == [6, 12, 3 * 17 - 3]
 
 
-def test_a_reduced_frame_gets_more_modes_of_its_fixed_interface() -> None:
+def test_a_reduced_frame_is_compared_with_the_whole_one() -> None:
     table = straight(PINNED, elements=8) | {"interface": ["a", "b"], "fixed_interface_modes": 3}
     found = only_body(table)
     more = found.with_more_modes(2)
-    assert more.model_dump()["fixed_interface_modes"] == 6 and modes_of(more) == modes_of(found) + 3
+    assert more.model_dump()["interface"] == () and modes_of(more) > modes_of(found) + 3
+    few = only_body(table | {"modes": 4})
+    assert [modes_of(few), modes_of(few.with_more_modes(2))] == [4, 8]
 
 
 def test_modes_of_a_body_in_a_file(tmp_path: Path) -> None:

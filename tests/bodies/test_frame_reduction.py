@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
+import studies
 from engine.bodies.frame.assembly import Assembly, assemble, rigid_motions
 from engine.bodies.frame.body import interface_freedoms
 from engine.bodies.frame.frame import Frame
 from engine.bodies.modal.craig_bampton import reduce_model
 from engine.bodies.modal.flexibility import factorised
 from engine.bodies.modal.modal_body import gauge_at
+from engine.scene.study import Study
 from results_schema.errors import BadInput
 from tests.bodies.frames import CLAMPED_FREE, LENGTH, RAIL, beam, body, straight
 
@@ -219,3 +221,36 @@ def test_missing_modes_are_noticed() -> None:
     omega, _ = flexibility.modes(9)
     assert flexibility._is_complete(omega**2)
     assert not flexibility._is_complete(np.delete(omega, 4) ** 2)
+
+
+def with_a_mass(kind: str, **more: Any) -> Study:
+    """On the portal."""
+    car = {
+        "on": "bed",
+        "kind": "mass",
+        "mass": 500.0,
+        "motion": {"kind": "cruise", "start": 0.0, "end": 6.0, "speed": 20.0},
+    }
+    asked = {"eigenfrequencies": {"question": {"positions": 7, "modes": 4}}, "passage": {"solver": {"audit": 0}}}
+    bed = portal() | {"damping_ratio": 0.02} | more
+    read = {"sensor": {"middle": {"body": "bed", "at": 2.5}}} if kind == "passage" else {}
+    return Study(kind=kind, body={"bed": bed}, carriage={"car": car}, **asked[kind], **read)
+
+
+@pytest.mark.parametrize(("interface", "count"), [("d", 0), ("d", 4), ("cdef", 2), ("de", 4), ("cf", 2), ("cf", 8)])
+def test_what_a_reduction_leaves_out_is_in_the_estimated_errors(interface: str, count: int) -> None:
+    """Of twice the modes within the interface they were told: 0 of none, and down to a hundredth of the true ones."""
+    reduced = {"interface": list(interface), "fixed_interface_modes": count, "modes": "auto"}
+    own, whole = (studies.run(with_a_mass("eigenfrequencies", **more)) for more in (reduced, {"modes": 64}))
+    off = np.abs(own.frequency / whole.frequency - 1.0).max("position").values.reshape(-1)
+    told = own.estimated_error.values.reshape(-1)[: off.size]
+    assert off.max() > 5e-4 and np.all((told >= off) & (told <= 1.5 * off + 1e-5))
+
+
+@pytest.mark.parametrize(("interface", "count"), [("d", 0), ("cf", 2)])
+def test_of_marches_too(interface: str, count: int) -> None:
+    reduced = {"interface": list(interface), "fixed_interface_modes": count, "modes": "auto"}
+    own, whole = (studies.run(with_a_mass("passage", **more)) for more in (reduced, {"modes": 64}))
+    off = abs(float(own.middle_max / whole.middle_max) - 1.0)
+    told = float(studies.errors(own).middle_max / own.middle_max)
+    assert 1e-2 < off <= told <= 5.0 * off

@@ -16,7 +16,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, Strict, Tag, model_
 
 from engine.bodies.frame.geometry import DIRECTIONS, SAME_PLACE, TrackLine, member_ends, unit
 from engine.bodies.frame.refusals import check_frame, check_spot, track_line
-from engine.bodies.modal.description import Body, Growing, Spot, Spots, check_square
+from engine.bodies.modal.description import MAX_MODES, Body, Growing, Spot, Spots, check_square
 from engine.bodies.modal.modal_body import Array, Direction, ModalBody
 from engine.bodies.modal.outline import HELD_AT, Outline
 from engine.bodies.modal.section_doubts import Doubt, section_doubts
@@ -318,22 +318,30 @@ class Frame(Body):
         return self.modes == "auto" and not (self.interface or self.leave_out)
 
     def with_more_modes(self, times: int) -> Frame:
-        """The same body with so many times its modes; of a reduced one, those within its fixed interface."""
+        """The same body with so many times its modes, not reduced: twice as many modes within a fixed interface may
+        change little, and all the others much."""
         if not self.interface:
             return super().with_more_modes(times)
-        fixed = self.model_copy(
-            update={"fixed_interface_modes": min(times * self.fixed_interface_modes, MAX_FIXED_INTERFACE_MODES)}
-        )
-        return fixed if self.modes == "auto" else fixed.with_modes(times * int(self.modes))
+        return self._not_reduced.with_modes(times * self._count)
+
+    @property
+    def _not_reduced(self) -> Frame:
+        return self.model_copy(update={"interface": ()})
+
+    @property
+    def _count(self) -> int:
+        """How many modes it keeps at most of its reduction."""
+        whole = min(6 * len(self.interface) + self.fixed_interface_modes, MAX_MODES)
+        return whole if self.modes == "auto" else int(self.modes)
 
     def with_more_elements(self, times: int) -> Frame:
         cut = {name: one.model_copy(update={"elements": times * one.elements}) for name, one in self.member.items()}
         return self.model_copy(update={"member": cut})
 
     def finer(self) -> Frame:
-        """With twice the elements too, and more of the modes within a fixed interface."""
-        body = self.with_more_modes(2) if self.interface else super().finer()
-        return body.with_more_elements(2)
+        """With twice the elements too, and not reduced."""
+        more = self._not_reduced.model_copy(update={"modes": 2 * self._count})
+        return (more if self.interface else super().finer()).with_more_elements(2)
 
     def outline(self, modal: ModalBody) -> Outline:
         from engine.bodies.frame.outline import frame_outline
