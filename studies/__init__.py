@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from results_schema.errors import BadInput, Remark
-    from studies.findings.absolute_errors import errors
     from studies.protocol.study import Kind, kind_named, kind_names, run
     from studies.reporting.answers import answer, figures
     from studies.reporting.comparison import compare
+    from studies.reporting.estimated_errors import errors
     from studies.reporting.report import report
     from studies.reporting.tabulated import export
     from studies.runs.datasets import write
@@ -27,7 +27,7 @@ _HOMES = {
     "run": "studies.protocol.study",
     "answer": "studies.reporting.answers",
     "figures": "studies.reporting.answers",
-    "errors": "studies.findings.absolute_errors",
+    "errors": "studies.reporting.estimated_errors",
     "compare": "studies.reporting.comparison",
     "export": "studies.reporting.tabulated",
     "write": "studies.runs.datasets",

@@ -16,7 +16,7 @@ from studies.findings.beyond import where_beyond
 from studies.protocol.library import built_in
 from studies.results.results import Results
 from tests.floating.scenes import sliding_mass
-from tests.studies import scenes
+from tests.studies import at_rest, scenes
 
 RUNS = (engine.run, studies.run)
 GIGAPASCALS = scenes.text_of("passage").replace('"210 GPa"', "70")
@@ -225,3 +225,18 @@ def test_built_in_studies_are_run_by_their_names() -> None:
     assert found.attrs["title"] == engine.load(built_in()["trajectory"]).title
     with pytest.raises(BadInput, match=r"trajectory\.toml"):
         studies.run("trajectory.toml")
+
+
+def test_errors_along_the_way_are_told_too() -> None:
+    """Of frequencies and of influence lines there were none."""
+    found = at_rest.run("eigenfrequencies", "positions = 5\nmodes = 4", at_rest.MASS)
+    errors = studies.errors(found)
+    assert list(errors.data_vars) == ["frequency"] and errors.frequency.attrs["units"] == "Hz"
+    assert errors.frequency.dims == found.frequency.dims and float(errors.frequency.min()) > 0.0
+    part = (errors.frequency / found.frequency).isel(mode=0)
+    np.testing.assert_allclose(part.max("position"), found.estimated_error.sel(result="frequency 1"), rtol=1e-12)
+    found = at_rest.run("influence", sweep=at_rest.MASS)
+    errors = studies.errors(found)
+    assert errors.middle.attrs["units"] == "m" and errors.middle.sizes == found.middle.sizes
+    told = found.estimated_error.sel(result="middle") * np.abs(found.middle).max("position")
+    np.testing.assert_allclose(errors.middle.max("position"), told, rtol=1e-12)

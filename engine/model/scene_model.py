@@ -18,8 +18,7 @@ from engine.model.refusals import check_rigid_modes
 from engine.model.rider import Rider
 from engine.model.support_reactions import Place, stand
 from engine.model.ties import CarriageTie, DamperTie, Load, PushTie, SpringTie
-from engine.scene.trains import in_step
-from engine.scene.variants import SpringKeys, in_use, keys_of_carriage
+from engine.scene.variants import SpringKeys, in_step, in_use, keys_of_carriage
 from results_schema.arrays import Array, Counts, Mask
 from results_schema.errors import BadInput
 from results_schema.status import Fidelity

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import accumulate
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 from pydantic import AfterValidator, Field, Strict, Tag, ValidationError, model_validator
@@ -28,9 +28,6 @@ from engine.study_file.units import (
     fault,
 )
 from results_schema.arrays import Array
-
-if TYPE_CHECKING:
-    from engine.scene.study import Study
 
 MAX_AXLES = 200
 
@@ -295,18 +292,6 @@ class Trains(Spec):
 def axle_name(train: str, axle: int) -> str:
     """Name of the carriage of an axle, counted from 0."""
     return f"{train}_{axle + 1}"
-
-
-def in_step(study: Study, carriage: str, swept: Collection[str]) -> str:
-    """What a force that pulsates swings by: its train, where all phases of that are one and none is among the keys that
-    are swept, else the carriage."""
-    train = study.axles.get(carriage)
-    if train is None:
-        return carriage
-    axles = [axle for axle, own in study.axles.items() if own == train]
-    keys = {f"carriage.{axle}.pulsation.phase" for axle in axles}
-    one = len({study.value(key) for key in keys}) == 1
-    return train if one and keys.isdisjoint(swept) else carriage
 
 
 def with_axles(document: Document) -> Document:

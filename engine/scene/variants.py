@@ -7,7 +7,7 @@ alone (`engine.scene.similarity`); every other swept number changes the scene it
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
@@ -54,6 +54,18 @@ class SpringKeys(NamedTuple):
     def of_contact(cls, carriage: str, contact: str) -> SpringKeys:
         """Of a contact of a body that rides."""
         return cls(*keys_of_carriage(f"{carriage}.contacts.{contact}", cls._fields))
+
+
+def in_step(study: Study, carriage: str, swept: Collection[str]) -> str:
+    """What a force that pulsates swings by: its train, where all phases of that are one and none is among the keys that
+    are swept, else the carriage."""
+    train = study.axles.get(carriage)
+    if train is None:
+        return carriage
+    axles = [axle for axle, own in study.axles.items() if own == train]
+    keys = {f"carriage.{axle}.pulsation.phase" for axle in axles}
+    one = len({study.value(key) for key in keys}) == 1
+    return train if one and keys.isdisjoint(swept) else carriage
 
 
 def keys_of_carriage(name: str, keys: Sequence[str]) -> tuple[str, ...]:

@@ -12,7 +12,6 @@ from results_schema.lazy_imports import xr
 from results_schema.quantities import AFTER_STOP
 from studies.findings.theory import body_mass
 from studies.protocol.study import kind_named
-from studies.results.cells import single_numbers
 from studies.results.formatting import quantity
 from studies.results.results import Results
 
@@ -22,40 +21,6 @@ DYNAMIC_AMPLIFICATION = "dynamic_amplification"
 OF_TOOLS = ("error_moving", "error_working", "error_holding")
 BEYOND_REST = tuple(name.replace("error", "beyond_rest") for name in OF_TOOLS)
 OF_RAILS = ("deflection_largest", "stress_largest")
-
-
-def errors(dataset: xr.Dataset) -> xr.Dataset:
-    """The estimated error of every result of a study's dataset, in the result's own unit: variables of the same names
-    over the same sweep (and sensors), NaN where no estimate or no result exists. Raises BadInput where the dataset is
-    none of a study."""
-    results, found = Results.of(dataset), dict[str, list[xr.DataArray]]()
-    if "estimated_error" not in results.dataset or not results.study.output.keeps_variants:
-        return xr.Dataset(attrs={"title": "no estimates of errors"})
-    for name, sensor, array in single_numbers(results.dataset):
-        if set(array.dims) == set(results.dims) and _told_as(name, sensor) in results.dataset["result"].values:
-            attributes = {"long_name": f"estimated error of {name}", "units": _unit(results, array, sensor)}
-            values = array.transpose(*results.dims)
-            own = values.copy(data=absolute_errors(results, name, sensor)).where(values.notnull())
-            found.setdefault(name, []).append(own.assign_attrs(attributes))
-    return xr.Dataset({name: _joined(results.dataset[name], parts) for name, parts in found.items()})
-
-
-def _unit(results: Results, array: xr.DataArray, sensor: str) -> str:
-    """The unit of a result, or of its sensor; a ratio has none."""
-    own = str(array.attrs.get("units", "") or "1")
-    if own != "1" or not sensor or array.name == DYNAMIC_AMPLIFICATION:
-        return own
-    return str(results.dataset["sensor_unit"].sel(sensor=sensor).item())
-
-
-def _joined(array: xr.DataArray, parts: list[xr.DataArray]) -> xr.DataArray:
-    """Errors of one result, over its sensors where it is over these."""
-    others = [dim for dim in array.dims if dim not in parts[0].dims]
-    if not others:
-        return parts[0]
-    bare = [part.drop_vars("sensor_unit", errors="ignore") for part in parts]
-    known = xr.concat(bare, others[0], coords="different", compat="equals")
-    return known.reindex({others[0]: array[others[0]].values}).transpose(*array.dims)
 
 
 def absolute_errors(results: Results, name: str, sensor: str = "", told_as: str = "") -> Array:
@@ -68,7 +33,7 @@ def absolute_errors(results: Results, name: str, sensor: str = "", told_as: str 
     largest value stands for it, which is not far from it but near a resonance.
     """
     error, (known, reported) = (
-        results.estimated_error(told_as or _told_as(name, sensor)),
+        results.estimated_error(told_as or told_as_of(name, sensor)),
         _scales(results, name, sensor),
     )
     # What is reported is off itself: the true one, which errors are parts of, may be larger by as much.
@@ -77,7 +42,7 @@ def absolute_errors(results: Results, name: str, sensor: str = "", told_as: str 
     )
 
 
-def _told_as(name: str, sensor: str) -> str:
+def told_as_of(name: str, sensor: str) -> str:
     """The name of a result among those whose errors are estimated."""
     if name in (*OF_TOOLS, *BEYOND_REST):
         return f"largest error of {sensor}"

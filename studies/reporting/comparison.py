@@ -14,7 +14,7 @@ from results_schema.arrays import Array
 from results_schema.errors import BadInput
 from results_schema.lazy_imports import xr
 from results_schema.status import Status, label
-from studies.at_rest.errors import errors_along
+from studies.at_rest.told_errors import errors_along
 from studies.findings.absolute_errors import absolute_errors
 from studies.reporting.summary import Range, asked
 from studies.results.results import Results

@@ -12,7 +12,7 @@ from engine.scene.trains import axle_name
 from results_schema.arrays import Array
 from results_schema.lazy_imports import xr
 from results_schema.status import Status, label
-from studies.at_rest.errors import errors_along
+from studies.at_rest.told_errors import errors_along
 from studies.findings.absolute_errors import absolute_errors, told_error
 from studies.findings.amplification import DYNAMIC_AMPLIFICATION, sizes, told_amplification
 from studies.findings.numerics_used import ERROR, WORK, is_marched

@@ -12,7 +12,7 @@ from results_schema.arrays import Array
 from results_schema.lazy_imports import xr
 from results_schema.status import Fidelity, Status
 from results_schema.variables import WHERE_OR_WHEN
-from studies.at_rest.errors import told_errors
+from studies.at_rest.told_errors import told_errors
 from studies.findings.numerics_used import ERROR, is_marched, known, of_variants
 from studies.results.cells import words_of
 from studies.results.formatting import counted, listed, percent, scientific, times
