@@ -63,6 +63,10 @@ CASES = {
         car=mass(0.1, {"kind": "waypoints", "times": [0.0, 2.0, 5.0], "positions": [0.1, 0.99, 0.99]})
     ),
     "critical speed": passing(car=mass(0.1, cruise(0.0, 1.0, 50.0))),
+    "gravity = 0.00981 m/s2: this is a thousandth or a thousand times of what there is, expected 9.81 m/s2, or 0; did "
+    'you mean "9.81 m/s^2"?': study(beam(), mass(0.1, WAY), gravity="9.81 mm/s^2"),
+    "gravity = 9810 m/s2: this is a thousandth or a thousand times of what there is, expected 9.81 m/s2, or 0; did "
+    'you mean "9810 mm/s^2"?': study(beam(), mass(0.1, WAY), gravity=9810.0),
     "carriage car runs at speeds up to 350 m/s (1,260 km/h): were km/h meant?": passing(
         beam(youngs_modulus=1e8),
         sweep={"speed": {"of": "carriage.car.motion.speed", "from": 100, "to": 350, "count": 2}},

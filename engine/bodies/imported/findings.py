@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 FITS = 1e-6  # of the stiffness: less resists rigid motions by rounding
 DOUBTFUL = 1e-3  # of the stiffness: matrices of six, four and three digits leave 1e-7, 1e-4 and 4e-3
 SAME_MASS = 1e-6  # relative difference of the mass in three directions that is still one mass
+UNLIKE = 1.5  # times the mass in another direction: what moves at held nodes is not counted, and is less
+#: kg for every metre of track: a fishing rod has 0.05, the heaviest bridges have 1e5.
+LEAST_PER_METRE, MOST_PER_METRE = 1e-2, 3e5
 SHEAR = 0.02  # relative difference of rotations and slopes beyond which the spline is worth a thought
 
 
@@ -44,14 +47,27 @@ def findings(body: Imported, held: HeldModel, along: LineShapes) -> tuple[tuple[
 
 
 def doubts(body: Imported, held: HeldModel) -> tuple[str, ...]:
-    """What is likely a mistake: of a model that the study holds, a stiffness that moves otherwise than its nodes."""
-    resisted = _resisted(held)
-    if resisted is None or resisted < DOUBTFUL or not body.supports:
-        return ()
-    return (
-        f"{resisted:.2g} of its stiffness resists rigid motions by the coordinates of its nodes: unless its matrices "
-        "hold it besides its supports, nodes are in another unit (length_unit), or freedoms are exchanged",
-    )
+    """What is likely a mistake: of a model that the study holds, a stiffness that moves otherwise than its nodes; a
+    mass that is another in other directions, or that no structure of this length has."""
+    found, resisted = list[str](), _resisted(held)
+    if resisted is not None and resisted >= DOUBTFUL and body.supports:
+        found.append(
+            f"{resisted:.2g} of its stiffness resists rigid motions by the coordinates of its nodes: unless its "
+            "matrices hold it besides its supports, nodes are in another unit (length_unit), or freedoms are exchanged"
+        )
+    masses = np.diag(held.inertia)[:3]
+    moved, ways = masses[masses > 0.0], ", ".join(np.array(["x", "y", "z"])[masses > 0.0])
+    if moved.size and moved.max() > UNLIKE * moved.min():
+        found.append(
+            f"its mass is {', '.join(f'{mass:.4g}' for mass in moved)} kg along {ways}: are rows of its matrices in "
+            "another order, or freedoms exchanged?"
+        )
+    elif moved.size and not LEAST_PER_METRE <= moved.max() / body.length <= MOST_PER_METRE:
+        found.append(
+            f"it has {moved.max():.4g} kg on {body.length:.4g} m of track: are its files in other units (length_unit "
+            "and the like)?"
+        )
+    return tuple(found)
 
 
 def _grounding(resisted: float | None) -> str:

@@ -9,7 +9,19 @@ from typing import Any
 import numpy as np
 
 from engine.study_file.checks import Check
-from engine.study_file.units import Area, Density, Dimensionless, Length, Pressure, SecondMoment, Unit, unit_of
+from engine.study_file.units import (
+    Acceleration,
+    Area,
+    Density,
+    Dimensionless,
+    Length,
+    Pressure,
+    SecondMoment,
+    Unit,
+    unit_of,
+)
+
+NEAR = 0.01  # of a thousand, as a power: 7 %
 
 
 @dataclass(frozen=True)
@@ -76,6 +88,19 @@ def damping_doubt(here: str) -> Doubt:
     key = f"{here}.damping_ratio"
     what, expected = "hardly any structure is damped so much", "at most 0.3, steel 0.005, concrete 0.02"
     return Doubt(key, (key,), lambda ratio: ratio <= 0.3, what, expected, unit_of(Dimensionless), ("%",))
+
+
+def gravity_doubt() -> Doubt:
+    """Of gravity in mm and not in m, either way."""
+    what, expected = "this is a thousandth or a thousand times of what there is", "9.81 m/s2, or 0"
+    others, unit = ("mm/s^2=m/s^2", "mm/s^2"), unit_of(Acceleration)
+    return Doubt("gravity", ("gravity",), _in_metres, what, expected, unit, others)
+
+
+def _in_metres(gravity: Any) -> Any:
+    """Whether it is no power of a thousand beside 9.81 m/s2."""
+    powers = np.log10(np.where(gravity == 0.0, 1.0, np.abs(gravity)) / 9.81) / 3.0
+    return (np.abs(powers - np.rint(powers)) > NEAR) | (np.rint(powers) == 0.0)
 
 
 def _modulus_of_matter(modulus: Any) -> Any:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
 from scipy.io import mmwrite
-from scipy.sparse import block_diag, csc_array, csc_matrix, save_npz
+from scipy.sparse import block_diag, csc_array, csc_matrix, csr_array, load_npz, save_npz
 from scipy.sparse.linalg import spsolve
 
 import engine
@@ -140,6 +140,29 @@ def test_a_stiffness_that_moves_otherwise_than_its_nodes_is_doubted(
     assert "length_unit" in str(refusal(loose.table(**changes)))  # where nothing holds it
     plan = make_plan(study(loose.table(supports=held, **changes), initial="rest"))
     assert [f"bed: {said}"] == [text for text in remarks(plan) if text.startswith("bed: ")]
+
+
+@pytest.mark.parametrize(("per_metre", "words"), [(1e-5, "kg on 15 m of track"), (1.0, ""), (1e5, "in other units")])
+def test_a_mass_that_no_structure_of_its_length_has_is_doubted(
+    loose: Files, tmp_path: Path, per_metre: float, words: str
+) -> None:
+    scaled = per_metre * load_npz(loose.folder / "mass.npz")
+    save_npz(tmp_path / "mass.npz", scaled)
+    said = modal(loose.table(mass=str(tmp_path / "mass.npz"), supports={"1": "clamped"})).doubts
+    assert len(said) == bool(words) and all(words in one for one in said)
+
+
+def test_rows_in_another_order_than_the_freedoms_are_doubted(loose: Files, tmp_path: Path) -> None:
+    """Of a bed whose displacements came first the mass was 477, 1273 and 487 kg along x, y and z, told in one row among
+    others; of a beam, whose masses are then the same, it is where they stand from the last to the first."""
+    size = load_npz(loose.folder / "mass.npz").shape[0]
+    order = np.arange(size)[::-1]
+    on_springs = loose.assembly.stiffness + 1e6 * csc_array(np.eye(size))
+    given = {"mass": loose.assembly.mass, "stiffness": on_springs}
+    for name, matrix in given.items():
+        save_npz(tmp_path / f"{name}.npz", csc_matrix(csr_array(matrix)[order][:, order]))
+    told = modal(loose.table(**{name: str(tmp_path / f"{name}.npz") for name in given}))
+    assert any("kg along x, y, z: are rows of its matrices in another order" in one for one in told.doubts)
 
 
 @pytest.mark.parametrize(("kept", "ways", "centre"), [((0, 2, 4), "x, z", "0.4"), ((2, 4), "z", "unknown")])
