@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import XAxis, YAxis
 from matplotlib.collections import PathCollection, QuadMesh
 
 from results_schema.arrays import Array, Counts, Mask
@@ -186,10 +187,15 @@ def along_axis(axes: Axes, seen: View) -> None:
     """Label and scale of the horizontal axis."""
     assert seen.x is not None
     axes.set_xlabel(seen.x.title)
-    if seen.x.sets(DIRECTION):
-        axes.set_xticks(seen.x.shown, [seen.x.in_words(float(value)) for value in seen.x.values])
+    _name_ways(axes.xaxis, seen.x)
     if is_logarithmic(seen.x.shown):
         logarithmic(axes.xaxis)
+
+
+def _name_ways(drawn: XAxis | YAxis, axis: Axis) -> None:
+    """Ticks of the way forward and backward in words."""
+    if axis.sets(DIRECTION):
+        drawn.set_ticks(axis.shown, labels=[axis.in_words(float(value)) for value in axis.values])
 
 
 def draw_curves(axes: Axes, seen: View, curves: Sequence[Curve]) -> None:
@@ -289,7 +295,9 @@ def draw_map(axes: Axes, seen: View, values: Any, **style: Any) -> Any:
         edges = _edges(x), _edges(y)
         mesh = axes.pcolormesh(*edges, grid.T, shading="flat", rasterized=rasterized, edgecolors="face", **style)
         mesh.set_linewidth(0.7)  # covers the seams that browsers show between cells
-    for axis, way, ends in ((axes.xaxis, x, axes.set_xlim), (axes.yaxis, y, axes.set_ylim)):
+    drawn = (axes.xaxis, seen.x, x, axes.set_xlim), (axes.yaxis, seen.y, y, axes.set_ylim)
+    for axis, of, way, ends in drawn:
+        _name_ways(axis, of)
         if np.nanmin(way) >= 0.0 > axis.get_view_interval()[0]:
             ends(0.0, None)  # the lowest cell reaches below its value
         if is_logarithmic(way):
