@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 #: rate of a fifth of it.
 MISSING = 0.05
 RATES = 513  # times at which given motions are looked at beforehand
-PRESSED = 1e-3  # of the weight that makes a body buckle: less is nothing to speak of
+PRESSED = 0.05  # of the weight that makes a body buckle: less softens it by no more than rotation may go untold
 DEEP = 0.1  # of the length, as of bodies that stand: a cantilever's deflection is off by 1 % then
 
 

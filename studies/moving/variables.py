@@ -154,7 +154,7 @@ RESULTS = (
         "buckling_ratio",
         ("frame",),
         long_name="weight that stands on a body at time 0 over that under which it buckles",
-        meaning="its own and that of all it carries, by its modes; NaN below a thousandth, and where it is not known",
+        meaning="its own and that of all it carries, by its modes; NaN below a twentieth, and where it is not known",
         required=False,
         nan_allowed=True,
     ),
