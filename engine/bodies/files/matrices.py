@@ -14,6 +14,8 @@ from engine.bodies.files.text import Line, file_bytes, lines_of, real, whole
 from results_schema.errors import BadInput
 from results_schema.lazy_imports import sparse
 
+NUMPY = b"\x93NUMPY"  # how a .npy file begins
+SPARSE = "%%MatrixMarket matrix ..., or a sparse matrix of scipy as .npz"
 _SPARSE = ("csr", "csc", "coo")
 _MODAL = ("0", "q", "modal")
 
@@ -39,6 +41,9 @@ def read_matrices(files: Mapping[str, str], options: Mapping[str, Any]) -> FileM
 
 def read_matrix(path: str, raw: bytes) -> Any:
     """A sparse matrix from Matrix Market text or scipy's NPZ. Raises BadInput."""
+    if raw.startswith(NUMPY):
+        remedy = "scipy.sparse.save_npz(path, scipy.sparse.csc_array(matrix))"
+        raise BadInput("this is an array of numpy", where=path, expected=SPARSE, remedy=remedy)
     found = _from_npz(path, raw) if raw[:2] == b"PK" else from_market(lines_of(path, raw))
     if np.iscomplexobj(found):
         raise BadInput("a complex matrix", where=path, expected="real numbers")
@@ -167,7 +172,7 @@ def from_market(lines: list[Line]) -> Any:
 def _head(line: Line) -> tuple[str, bool]:
     words = line.text.lower().split()
     if words[:2] != ["%%matrixmarket", "matrix"]:
-        what, expected = "no Matrix Market file", "%%MatrixMarket matrix ..., or a sparse matrix of scipy as .npz"
+        what, expected = "no Matrix Market file", SPARSE
         raise line.fault(what, expected=expected, received=line.text)
     if len(words) != 5 or words[2] not in _FORMS or words[3] not in ("real", "double", "integer"):
         raise line.fault("not a matrix of real numbers", expected="coordinate or array, real or integer")

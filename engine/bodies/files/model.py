@@ -165,6 +165,13 @@ def _checked_recovery(model: FileModel, where: str) -> Any:
     return sparse.csc_array(found, dtype=np.float64)
 
 
+def _half(matrix: Any) -> str:
+    """What completes a matrix of which one triangle alone is there; "" of others."""
+    triangles = {"lower": sparse.tril(matrix, -1), "upper": sparse.triu(matrix, 1)}
+    empty = [name for name, part in triangles.items() if not part.nnz]
+    return f"the {empty[0]} triangle is empty: add the transpose, less the diagonal" if len(empty) == 1 else ""
+
+
 def _symmetric(model: FileModel, matrix: Any, name: str, where: str) -> Any:
     """The mean of a matrix and its transpose; what has no diagonal has nothing beside it either."""
     gap = abs(matrix - matrix.T).tocoo()
@@ -179,6 +186,7 @@ def _symmetric(model: FileModel, matrix: Any, name: str, where: str) -> Any:
             where=where,
             expected="a symmetric matrix, both triangles or a symmetric format",
             received=f"a difference of {gap.data[worst] / largest:.3g} of the largest entry",
+            remedy=_half(matrix),
         )
     found = (0.5 * (matrix + matrix.T)).tocsc()
     lone = (found.diagonal() == 0.0) & (abs(found).sum(axis=0) > 0.0)

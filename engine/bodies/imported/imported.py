@@ -251,7 +251,8 @@ class Imported(Body):
             low, _, high = part.partition("-")
             chosen = (nodes >= int(low)) & (nodes <= int(high or low))
             if not chosen.any():
-                refuse(("supports", text), "there is no such node", received=part)
+                expected = f"one of {len(nodes)} nodes from {nodes.min()} to {nodes.max()}"
+                refuse(("supports", text), "there is no such node", expected=expected, received=part)
             found |= chosen
         return np.flatnonzero(found)
 

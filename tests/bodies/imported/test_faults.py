@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.io import mmwrite
-from scipy.sparse import csc_matrix, save_npz
+from scipy.sparse import csc_matrix, save_npz, tril
 
 from engine.batch.plan import make_plan
 from engine.bodies.imported.imported import Matrices
@@ -100,7 +100,15 @@ def faults(folder: Path, files: Files) -> dict[str, tuple[dict[str, Any], list[s
         "track order": ({"track": {"nodes": [1, 9, 4, 2]}}, ["bed.track", "9 and 4"]),
         "track beside": ({"track": {"from": [0, 1, 0], "to": [15, 1, 0]}}, ["bed.track", "too few", "1.0"]),
         "along": ({"gravity_direction": [1.0, 0.0, 0.0]}, ["bed.track.direction", "along the track"]),
-        "support": ({"supports": {"77": "clamped"}}, ["bed.supports.77", "no such node"]),
+        "support": (
+            {"supports": {"77": "clamped"}},
+            ["bed.supports.77", "no such node", "17 nodes from 1 to 17"],
+        ),
+        "numpy": ({"mass": written("m.npy", b"\x93NUMPY\x01\0v\0")}, ["array of numpy", "scipy.sparse.save_npz(path"]),
+        "a triangle": (
+            {"stiffness": matrix(lambda k: k.__setitem__(slice(None), tril(k).tolil()))},
+            ["not symmetric", "the upper triangle is empty: add the transpose, less the diagonal"],
+        ),
         "support words": ({"supports": {"left": "clamped"}}, ["bed.supports.left", "1-21"]),
         "point": ({"point": {"p": {"node": 77}}}, ["bed.point.p.node", "77"]),
         "two ways": ({"track": {"nodes": [1, 2], "from": [0, 0, 0]}}, ["bed.track", "one way"]),
