@@ -50,9 +50,11 @@ def enough_modes(results: Results, error: Array, wanted: float, what: str, again
         worst = np.maximum.accumulate(row[::-1])[::-1]
         enough = [int(count) for count, rest in zip(counts, worst, strict=True) if rest <= wanted]
         texts.append(f"{words} from {enough[0]} modes of every body on" if enough else f"{words} with none of them")
+    within = [f"body.{name}.{body.modes_within}" for name, body in results.study.body.items() if body.modes_within]
+    limited = whole[0].min() > wanted and bool(within)
     return (
         f"Of {counts[0]} to {counts[-1]} modes of every body, {what} within {percent(wanted)} of {against}: "
-        f"{listed(texts)}."
+        f"{listed(texts)}.{f' All of them lie within {listed(within)}: more of these help.' if limited else ''}"
     )
 
 

@@ -247,6 +247,16 @@ def test_what_a_reduction_leaves_out_is_in_the_estimated_errors(interface: str, 
     assert off.max() > 5e-4 and np.all((told >= off) & (told <= 1.5 * off + 1e-5))
 
 
+def test_where_no_number_of_modes_is_enough_the_reduction_is_named() -> None:
+    reduced = {"interface": ["d"], "fixed_interface_modes": 2, "modes": "auto"}
+    asked = {"question.unreduced": 3, "question.mode_counts": [4, 8]}
+    given = with_a_mass("eigenfrequencies", **reduced).with_values(asked)
+    named = "All of them lie within body.bed.fixed_interface_modes: more of these help."
+    assert sum(named in said for said in studies.answer(studies.run(given))) == 1
+    enough = given.with_values({"body.bed.interface": [], "question.mode_counts": [8, 40]})
+    assert not any("lie within" in said for said in studies.answer(studies.run(enough)))
+
+
 @pytest.mark.parametrize(("interface", "count"), [("d", 0), ("cf", 2)])
 def test_of_marches_too(interface: str, count: int) -> None:
     reduced = {"interface": list(interface), "fixed_interface_modes": count, "modes": "auto"}

@@ -317,6 +317,10 @@ class Frame(Body):
     def modes_are_open(self) -> bool:
         return self.modes == "auto" and not (self.interface or self.leave_out)
 
+    @property
+    def modes_within(self) -> str:
+        return "fixed_interface_modes" if self.interface else ""
+
     def with_more_modes(self, times: int) -> Frame:
         """The same body with so many times its modes, not reduced: twice as many modes within a fixed interface may
         change little, and all the others much."""

@@ -268,6 +268,11 @@ class Body(SpecOfKind):
         """Whether the number of its modes is chosen by the tolerance."""
         return False
 
+    @property
+    def modes_within(self) -> str:
+        """The key of a number that all its modes lie within, as of a reduction; "" where they are the body's own."""
+        return ""
+
     def with_modes(self, count: int) -> Self:
         """The same body with so many modes."""
         return self.model_copy(update={"modes": min(count, MAX_MODES)})
