@@ -57,15 +57,15 @@ class SpringKeys(NamedTuple):
 
 
 def in_step(study: Study, carriage: str, swept: Collection[str]) -> str:
-    """What a force that pulsates swings by: its train, where all phases of that are one and none is among the keys that
-    are swept, else the carriage."""
-    train = study.axles.get(carriage)
+    """What a force that pulsates swings by, as a dotted key: its train, where all phases of that are one and none is
+    among the keys that are swept, else the carriage."""
+    train, alone = study.axles.get(carriage), f"carriage.{carriage}"
     if train is None:
-        return carriage
+        return alone
     axles = [axle for axle, own in study.axles.items() if own == train]
     keys = {f"carriage.{axle}.pulsation.phase" for axle in axles}
     one = len({study.value(key) for key in keys}) == 1
-    return train if one and keys.isdisjoint(swept) else carriage
+    return f"train.{train}" if one and keys.isdisjoint(swept) else alone
 
 
 def keys_of_carriage(name: str, keys: Sequence[str]) -> tuple[str, ...]:

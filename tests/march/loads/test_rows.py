@@ -70,6 +70,13 @@ def test_those_that_swing_in_step_share_a_coordinate() -> None:
     np.testing.assert_allclose(one, other, rtol=0, atol=1e-10 * float(np.abs(other).max()))
 
 
+def test_a_carriage_of_the_name_of_a_train_swings_by_itself() -> None:
+    own = force(1.0, WAY, pulsation={"amplitude": 1.0, "frequency": 0.5})
+    walkers = force(2.0, WAY, pulsation=IN_STEP) | ROW
+    given = study(beam(), {"group": own}, train={"group": walkers}, sensor={"midspan": fixed(0.5)})
+    assert coordinates(given) == 2
+
+
 @pytest.mark.parametrize("number", ["frequency", "amplitude", "amplitude.1"])
 def test_what_is_swept_of_all_leaves_them_in_step(number: str) -> None:
     keys = list(row(IN_STEP).targets(f"train.group.pulsation.{number}"))
