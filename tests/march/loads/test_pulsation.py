@@ -37,16 +37,16 @@ def crossing(pulse: Table | None, motion: Table | None = None, **more: Any) -> S
 def swings(
     pulse: Table,
     times: Array,
-    place: float = 0.5,
+    place: float | Array = 0.5,
     *,
     at: float | None = None,
     modes: int = 3,
     speed: float = SPEED,
     zeta: float = ZETA,
 ) -> Array:
-    """Deflection of the beam at a place under the force on its way, or at one place: of every mode what
-    F phi + A phi sin(W t + psi) asks for, as a sum of cosines, and what swings freely beside it."""
-    found = np.zeros_like(times)
+    """Deflection of the beam at a place (or places (P,), as (P, T)) under the force on its way, or at one place: of
+    every mode what F phi + A phi sin(W t + psi) asks for, as a sum of cosines, and what swings freely beside it."""
+    found = np.zeros((*np.shape(place), times.size))
     turn, psi, half = 2.0 * math.pi * pulse["frequency"], pulse.get("phase", 0.0), 0.5 * pulse["amplitude"]
     for k in range(1, modes + 1):
         omega, wave = OMEGA * k**2, k * math.pi * speed
@@ -64,7 +64,8 @@ def swings(
         own = omega * math.sqrt(1.0 - zeta**2)
         start, begins = -forced[0].real, -rate.real
         free = start * np.cos(own * times) + (begins + zeta * omega * start) / own * np.sin(own * times)
-        found += math.sqrt(2.0) * math.sin(k * math.pi * place) * (forced.real + np.exp(-zeta * omega * times) * free)
+        shapes = math.sqrt(2.0) * np.sin(k * math.pi * np.asarray(place))[..., None]
+        found += shapes * (forced.real + np.exp(-zeta * omega * times) * free)
     return found
 
 
@@ -152,8 +153,8 @@ def test_told_errors_are_those_of_the_closed_form() -> None:
     found, times = studies.run(given), np.linspace(0.0, 10.0, 25_001)
     assert (found.status == 0).all()
     for n, pace in enumerate(found.pace.values):
-        for name, place in (("midspan", 0.5), ("quarter", 0.25)):
-            right = swings(pulse | {"frequency": float(pace)}, times, place, modes=60, speed=0.1)
+        both = swings(pulse | {"frequency": float(pace)}, times, np.array([0.5, 0.25]), modes=60, speed=0.1)
+        for name, place, right in (("midspan", 0.5, both[0]), ("quarter", 0.25, both[1])):
             size, told = np.abs(right).max(), float(found.estimated_error.sel(result=f"{name}_max")[n])
             static = FORCE * place**2 * (1.0 - place) ** 2 / 3.0
             off = abs(float(found[f"{name}_max"][n]) - right.max()) / max(size, static)
