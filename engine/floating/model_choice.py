@@ -90,11 +90,12 @@ def choose(study: Study, pilots: VariantValues, duration: Array, longest: float)
 
 
 def may_stiffen(study: Study, *, said: bool | None = None) -> tuple[str, ...]:
-    """Bodies that what pulls at them would stiffen as they move, of which the study says nothing, or that they do
-    not."""
+    """Bodies that what pulls at them would stiffen as they move, or as they stand turned and have a weight, of which
+    the study says nothing, or that they do not."""
     bodies = build(study, FIRST_MODES).bodies
     frames = {name: frame for name, frame in study.frame.items() if name in bodies and frame.stiffening is said}
-    able = [name for name, frame in frames.items() if not (frame.stands or frame.torsion_modes)]
+    lies = {name for name, frame in frames.items() if frame.stands and not (study.gravity and any(frame.turned))}
+    able = [name for name, frame in frames.items() if not (name in lies or frame.torsion_modes)]
     return tuple(name for name in able if bodies[name].shortening is not None and bodies[name].omega.size)
 
 

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from engine.floating.model import FloatingModel
 
 OF_DEPTH = 4  # signals of a body
+SHEAR = 3  # the derivative of a deflection that jumps where a force acts
 ROUNDING = 1e-13  # of a modal mass: modes that share less are orthogonal (beams of 24 modes leave 2e-14)
 
 
@@ -49,7 +50,7 @@ def system_of(model: FloatingModel) -> System:
     loads, tips = list(enumerate(model.loads)), tip_tables(model, n, most)
     (shortening, foreshortening), (points, point_shorter) = _foreshortening(model), _ends(model, n, most)
     grips = [*(load.grip for load in model.loads), *(grip for link in model.links for grip in link)]
-    missed_of, missed, missed_lines, missed_grips = missed_sections(model, grips)
+    missed_of, missed, missed_lines, (missed_grips, missed_twists) = missed_sections(model, grips)
     return System(
         tree,
         numbers,
@@ -77,6 +78,7 @@ def system_of(model: FloatingModel) -> System:
         missed,
         missed_lines,
         missed_grips,
+        missed_twists,
         _smooth(model),
         tips.tips,
         tips.places,
@@ -210,11 +212,13 @@ def _readings(model: FloatingModel) -> tuple[Array, Counts]:
 
 
 def _smooth(model: FloatingModel) -> Counts:
-    """(K, 2) signals that go on as smoothly as coordinates do: what sensors read of these, also after stops, and places
-    along tracks of what slides by itself: given motions may stop at an instant, over which a parabola would pass; and
-    whether it is their squares that do, as of lengths."""
-    read = model.study.sensor.values()
-    sensors = [n for n, sensor in enumerate(read) if not (sensor.reads.rate or sensor.reads.of_drive)]
+    """(K, 2) signals that go on as smoothly as coordinates do: what sensors read of these, also after stops, but for
+    shear forces, which jump as a carriage passes; and places along tracks of what slides by itself: given motions may
+    stop at an instant, over which a parabola would pass; and whether it is their squares that do, as of lengths."""
+    read, ridden = model.study.sensor.values(), {carriage.on for carriage in model.study.carriage.values()}
+    jumps = [sensor.reads.derivative == SHEAR and sensor.body in ridden for sensor in read]
+    rough = [sensor.reads.rate or sensor.reads.of_drive or jump for sensor, jump in zip(read, jumps, strict=True)]
+    sensors = [n for n, one in enumerate(rough) if not one]
     first = model.signal_of("carriages")
     places = [first + OF_CARRIAGE * c for c, name in enumerate(model.study.carriage) if name in model.places]
     stops = [model.signal_of("stops") + t for t in range(len(model.tips))]

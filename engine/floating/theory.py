@@ -61,15 +61,15 @@ def buckling_ratios(model: FloatingModel, table: Lane, signals: Array) -> Array:
         if shorter is None or not body.omega.size:
             continue
         nine = slice(first + OF_BODY * b, first + OF_BODY * b + 9)
-        up = np.einsum("vi,vij->vj", table.gravity, signals[:, nine].reshape(-1, 3, 3))[:, : shorter.axes]
-        pressed = _pressed(model, name, shorter, table, signals) / np.multiply.outer(body.omega, body.omega)
-        softer = np.einsum("va,vaij->vij", up, pressed)
+        pull = np.einsum("vi,vij->vj", table.gravity, signals[:, nine].reshape(-1, 3, 3))[:, : shorter.axes]
+        borne = _borne_by(model, name, shorter, table, signals) / np.multiply.outer(body.omega, body.omega)
+        softer = -np.einsum("va,vaij->vij", pull, borne)
         known = np.isfinite(softer).all(axis=(1, 2))
         found[known, b] = np.linalg.eigvalsh(softer[known])[:, -1]
     return np.where(found > PRESSED, found, np.nan)
 
 
-def _pressed(model: FloatingModel, name: str, shorter: Shortening, table: Lane, signals: Array) -> Array:
+def _borne_by(model: FloatingModel, name: str, shorter: Shortening, table: Lane, signals: Array) -> Array:
     """(V, A, N, N) the integral of G dm over a body and all that hangs and rides on it."""
     places, masses = [], []
     for other in model.bodies:
@@ -83,8 +83,9 @@ def _pressed(model: FloatingModel, name: str, shorter: Shortening, table: Lane, 
             masses.append(table.carriages[:, c, OWN_MASS] + table.carriages[:, c, SPRUNG_MASS])
     found = np.repeat(shorter.integrals[0][None], len(signals), axis=0)
     for x, mass in zip(places, masses, strict=True):
-        distinct, of = np.unique(x, return_inverse=True)
-        found = found + mass[:, None, None, None] * shorter.along(distinct)[0][of]
+        known = np.isfinite(x)  # not of variants that have no place to begin at
+        distinct, of = np.unique(np.clip(np.where(known, x, 0.0), 0.0, model.bodies[name].length), return_inverse=True)
+        found = found + np.where(known, mass, np.nan)[:, None, None, None] * shorter.along(distinct)[0][of]
     return found
 
 

@@ -79,7 +79,8 @@ class System(NamedTuple):
     component that it reads there; 0, 1 or 2 for coordinates, velocities or accelerations. missed_sections (K, 2),
     missed (K, MISSED): readings of section forces, and what their modes miss; missed_lines (K, 2, cells, 4): that by a
     unit force across the track, in equal cells before and beyond the place; missed_grips (K, P): that at grips, times
-    weight. smooth (K, 2): signals that have extremes between stations.
+    weight, and missed_twists (K, P) that by a unit torque about y. smooth (K, 2): signals that have extremes between
+    stations.
     tips (T, 2), tip_places (T, 6 + 3 n): places whose distance from the rigid arm is read; tip_shorter (T, A, n, n): G
     there; carrying (L): the bodies of these arms, each after its parent. bands (T, K), m: of each tip, within which it
     is told when what is left after a stop stays; none where no study asks.
@@ -116,6 +117,7 @@ class System(NamedTuple):
     missed: FloatArray
     missed_lines: FloatArray
     missed_grips: FloatArray
+    missed_twists: FloatArray
     smooth: IntArray
     tips: IntArray
     tip_places: FloatArray

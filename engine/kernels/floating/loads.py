@@ -124,8 +124,8 @@ def missed_by_loads(system, lane, k, x, work):
     for q in range(system.load_table.shape[0]):
         p = system.load_table[q, GRIP]
         if system.gripped[p] == b:
-            f, _ = load_at(system, lane, q, work)
-            found = found + system.missed_grips[k, p] * f[2]
+            f, about = load_at(system, lane, q, work)
+            found = found + system.missed_grips[k, p] * f[2] + system.missed_twists[k, p] * about[1]
     for one in range(system.links.shape[0]):
         for end in range(2):
             p = system.links[one, end]

@@ -54,13 +54,13 @@ def shapes_at(system, b, s, components, work):
 
 @called
 def missed_line(system, k, s, gathered):
-    """What the modes miss of a section force by a unit force at places s of the track."""
+    """What the modes miss of a section force by a unit force at places s of the track, just beyond one at its own."""
     place, length = system.missed[k, MISSED_PLACE], system.bodies[system.missed_sections[k, MISSED_BODY], LENGTH]
     count = system.missed_lines.shape[2]
     put_lanes(gathered, (AT,), s)
     for j in range(LANES):
         at = gathered[AT, j]
-        before = place > 0.0 and (at < place or place >= length)
+        before = place > 0.0 and (at <= place or place >= length)
         side, low, width = (0, 0.0, place / count) if before else (1, place, (length - place) / count)
         part = (at - low) / width
         cell = int(min(part if part > 0.0 else 0.0, count - 1.0))  # NaN too
