@@ -17,9 +17,10 @@ from engine.floating.converge import MORE_MODES, STATIONS, Level, levels, usual_
 from engine.floating.model import build
 from engine.floating.results import Outcome, differences, results_of
 from engine.floating.schemes import USUAL
+from engine.floating.theory import softened_by_weight
 from engine.scene.frames import GROUND
 from results_schema.arrays import Array
-from results_schema.status import Fidelity
+from results_schema.status import Fidelity, Status
 
 if TYPE_CHECKING:
     from engine.floating.model import FloatingModel
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from engine.scene.variants import VariantValues
 
 PILOTS = 16  # of a scene: by so many the errors that are told were measured (`tests.calibration.frames`)
+NOTHING = 1e-4  # of its stiffness, by which weight softens a body that stands: less is not looked at
 PART = 0.1  # of a tolerance that the cheaper model may take; the rest is for modes and steps
 FINER = (1, 4, 16)  # times the coarsest steps, where pilots fail with these
 FIRST_MODES, MOST_MODES = 2, 32  # of bending, of a beam
@@ -74,7 +76,10 @@ def choose(study: Study, pilots: VariantValues, duration: Array, longest: float)
     refused = _by_lack_of_stiffening(own, modes, may_stiffen(study, said=False))
     fixed = np.where(np.isinf(refused), np.nan, refused)
     stiffened, by_lack = _those_that_stiffen(own, modes)
-    study, own, left_out = _stiffened(study, stiffened), own.stiffened(stiffened), left_out + by_lack
+    study, own = _stiffened(study, stiffened), own.stiffened(stiffened)
+    if stiffened:  # modes that were enough without
+        modes, left_out = _enough_modes(own, min(modes, MOST_MODES // MORE_MODES))
+    left_out = left_out + by_lack
     level = next(iter(levels(study, longest, modes)))
     model, results = level.model, results_of(level.model)
     by_fixed = FewPilots(pilots.columns, fixed + _by_fixed_modes(own, modes) + _by_elements(own, modes))
@@ -92,11 +97,12 @@ def choose(study: Study, pilots: VariantValues, duration: Array, longest: float)
 def may_stiffen(study: Study, *, said: bool | None = None) -> tuple[str, ...]:
     """Bodies that what pulls at them would stiffen as they move, or as they stand turned and have a weight, of which
     the study says nothing, or that they do not."""
-    bodies = build(study, FIRST_MODES).bodies
+    model = build(study, FIRST_MODES)
+    bodies = model.bodies
     frames = {name: frame for name, frame in study.frame.items() if name in bodies and frame.stiffening is said}
-    lies = {name for name, frame in frames.items() if frame.stands and not (study.gravity and any(frame.turned))}
-    able = [name for name, frame in frames.items() if not (name in lies or frame.torsion_modes)]
-    return tuple(name for name in able if bodies[name].shortening is not None and bodies[name].omega.size)
+    able = [name for name, frame in frames.items() if not frame.torsion_modes]
+    able = [name for name in able if bodies[name].shortening is not None and bodies[name].omega.size]
+    return tuple(name for name in able if not frames[name].stands or softened_by_weight(model, name) > NOTHING)
 
 
 def _stiffened(study: Study, names: Iterable[str]) -> Study:
@@ -133,20 +139,20 @@ def _by_lack_of_stiffening(pilots: Pilots, modes: int, names: tuple[str, ...]) -
     return found
 
 
-def _enough_modes(pilots: Pilots) -> tuple[int, Array]:
-    """The fewest modes whose error is a small part of the tolerance, or the most, and that error (R,); infinite where
-    no pilot can be marched with the steps of the coarsest levels."""
+def _enough_modes(pilots: Pilots, first: int = FIRST_MODES) -> tuple[int, Array]:
+    """The fewest modes, of so many at first, whose error is a small part of the tolerance, or the most, and that error
+    (R,); infinite where no pilot can be marched with the steps of the coarsest levels."""
     model = build(pilots.study, FIRST_MODES)
     nothing = np.zeros(len(results_of(model)))
     if not model.is_open:
         return FIRST_MODES, nothing
-    tried = (_enough_by(pilots, usual_steps(model, pilots.longest) * factor) for factor in FINER)
+    tried = (_enough_by(pilots, first, usual_steps(model, pilots.longest) * factor) for factor in FINER)
     return next((found for found in tried if found is not None), (MOST_MODES, nothing + np.inf))
 
 
-def _enough_by(pilots: Pilots, steps: int) -> tuple[int, Array] | None:
+def _enough_by(pilots: Pilots, modes: int, steps: int) -> tuple[int, Array] | None:
     """The same by marches of so many steps, whose own error is in all of them; None where no pilot gets through."""
-    modes, coarse, change = FIRST_MODES, None, np.array(np.nan)
+    coarse, change = None, np.array(np.nan)
     while True:
         model = build(pilots.study, modes)
         fine = pilots.march(model, steps)
@@ -156,6 +162,8 @@ def _enough_by(pilots: Pilots, steps: int) -> tuple[int, Array] | None:
             known = ~np.isnan(left).any(axis=0)
             if not known.any():
                 return None
+            within = known & (fine.status != Status.BEYOND_THEORY)  # such as what nearly buckles, of many that do not
+            known = within if within.any() else known
             before = worst(apart + left, results_of(model), pilots.values)
             if (before[known] <= PART).all():
                 return modes // MORE_MODES, (apart + left)[:, known].max(axis=1)

@@ -170,7 +170,7 @@ def outcome(model: FloatingModel, marched: Marched) -> Outcome:
     found["end_min"] = statistics[:, ends(model), SMALLEST].reshape(shape)
     whole = model.signal_of("whole")
     energy = marched.history[:, :, whole + KINETIC] + marched.history[:, :, whole + POTENTIAL]
-    found["energy_change"] = np.nanmax(np.abs(energy - energy[:, :1]), axis=1)
+    found["energy_change"] = np.fmax.reduce(np.abs(energy - energy[:, :1]), axis=1)
     found["duration"] = marched.last * step
     times, other_bands = settled(model, marched)
     found |= times

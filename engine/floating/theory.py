@@ -49,6 +49,21 @@ def lacking(model: FloatingModel, name: str) -> Array:
     return np.array(found)
 
 
+def softened_by_weight(model: FloatingModel, name: str) -> float:
+    """By how much of its stiffness the weight that a body bears stiffens or softens it at most, carriages at the end of
+    its track, with the study's own numbers; 0 of one that is not turned."""
+    body, study = model.bodies[name], model.study
+    if body.shortening is None or not study.gravity or not any(model.frame(name).turned):
+        return 0.0
+    borne = sum(_carried(model, other) for other in model.bodies if model.frame(other).on == name)
+    for carriage, own in study.carriage.items():
+        if name in model.carriers(own.on):
+            borne += sum(float(study.value(f"carriage.{carriage}.{key}") or 0.0) for key in own.masses)
+    whole = body.shortening.integrals[0] + borne * body.shortening.along(np.array([body.length]))[0, 0]
+    ratios = study.gravity * whole / np.multiply.outer(body.omega, body.omega)
+    return float(max(np.abs(np.linalg.eigvalsh(ratio)).max() for ratio in ratios))
+
+
 def buckling_ratios(model: FloatingModel, table: Lane, signals: Array) -> Array:
     """(V, B) the weight that stands on each body, its own and that of all that hangs and rides on it, over that under
     which it buckles, as variants of a table stand by their signals (V, ...) at time 0: the largest eigenvalue of what
