@@ -67,7 +67,7 @@ def refuse_table(archive: Path | None) -> None:
 def as_typed(study: str) -> str:
     """What to type for a study whose file has this name.
 
-    >>> as_typed(str(find_study("asymmetry")))
+    >>> as_typed(str(built_in()["asymmetry"]))
     'asymmetry'
     """
     return next((name for name, path in built_in().items() if str(path) == study), study)
