@@ -17,6 +17,7 @@ from engine.batch.remarks_of_carriages import (
     swings_slowly,
 )
 from engine.bodies.modal.modal_body import ModalBody
+from engine.bodies.modal.section_doubts import gravity_doubt
 from engine.model.lane_table import moving_mass, weight
 from engine.observation.signals import build_sensors
 from engine.scene.study import Study
@@ -156,7 +157,7 @@ def _along(grid: SceneGrid, number: int) -> float:
 
 def doubtful(study: Study, cases: Cases) -> Iterator[str]:
     """Numbers that are hardly meant."""
-    for doubt in study.doubts():
+    for doubt in (gravity_doubt(), *study.doubts()):
         if found := broken(study, cases, doubt):
             values = found[0]
             said = f"{doubt.where} = {doubt.amount(values)}: {doubt.what}, expected {doubt.expected}"

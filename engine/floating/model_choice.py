@@ -95,13 +95,13 @@ def choose(study: Study, pilots: VariantValues, duration: Array, longest: float)
 
 
 def may_stiffen(study: Study, *, said: bool | None = None) -> tuple[str, ...]:
-    """Bodies that what pulls at them would stiffen as they move, or as they stand turned and have a weight, of which
-    the study says nothing, or that they do not."""
+    """Bodies that what pulls at them would stiffen as they move, or their weight as they stand, of which the study
+    says nothing, or that they do not."""
     model = build(study, FIRST_MODES)
     bodies = model.bodies
     frames = {name: frame for name, frame in study.frame.items() if name in bodies and frame.stiffening is said}
-    able = [name for name, frame in frames.items() if not frame.torsion_modes]
-    able = [name for name in able if bodies[name].shortening is not None and bodies[name].omega.size]
+    able = [name for name in frames if bodies[name].shortening is not None and bodies[name].omega.size]
+    able = [name for name in able if not frames[name].torsion_modes]
     return tuple(name for name in able if not frames[name].stands or softened_by_weight(model, name) > NOTHING)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -26,15 +26,24 @@ SHEAR = 3  # the derivative of a deflection that jumps where a force acts
 ROUNDING = 1e-13  # of a modal mass: modes that share less are orthogonal (beams of 24 modes leave 2e-14)
 
 
-def system_of(model: FloatingModel) -> System:
-    """The tables of a model, see `engine.kernels.floating.layout`."""
+class Bodies(NamedTuple):
+    """tree, bodies, modes, pairs, track and hanging_shorter of a system, see `engine.kernels.floating.layout`."""
+
+    tree: Counts
+    numbers: Array
+    modes: Array
+    pairs: Array
+    track: Array
+    hanging_shorter: Array
+
+
+def _bodies(model: FloatingModel, n: int, most: int) -> Bodies:
+    """Those of bodies of at most n modes, whose places come nearer along so many axes."""
     names = list(model.bodies)
-    n = max(1, *(body.omega.size for body in model.bodies.values()))
     B = len(names)
     tree = np.zeros((B, columns.TREE), dtype=np.int64)
     numbers = np.zeros((B, columns.BODY))
     modes, pairs = np.zeros((B, n, columns.MODE)), np.zeros((B, n, n, columns.PAIR))
-    most = max(1, *(body.shortened for body in model.bodies.values()))
     track, hanging_shorter = np.zeros((B, CELLS, 6, 6, n)), np.zeros((B, most, n, n))
     joint = 0
     for b, (name, body) in enumerate(model.bodies.items()):
@@ -47,6 +56,15 @@ def system_of(model: FloatingModel) -> System:
         _hang(model, name, numbers[b], modes[b], hanging_shorter[b])
         if N:
             track[b, ..., :N] = body.track()
+    return Bodies(tree, numbers, modes.reshape(B * n, -1), pairs.reshape(B * n * n, -1), track, hanging_shorter)
+
+
+def system_of(model: FloatingModel) -> System:
+    """The tables of a model, see `engine.kernels.floating.layout`."""
+    names, B = list(model.bodies), len(model.bodies)
+    n = max(1, *(body.omega.size for body in model.bodies.values()))
+    most = max(1, *(body.shortened for body in model.bodies.values()))
+    tree, numbers, modes, pairs, track, hanging_shorter = _bodies(model, n, most)
     loads, tips = list(enumerate(model.loads)), tip_tables(model, n, most)
     (shortening, foreshortening), (points, point_shorter) = _foreshortening(model), _ends(model, n, most)
     grips = [*(load.grip for load in model.loads), *(grip for link in model.links for grip in link)]
@@ -54,8 +72,8 @@ def system_of(model: FloatingModel) -> System:
     return System(
         tree,
         numbers,
-        modes.reshape(B * n, -1),
-        pairs.reshape(B * n * n, -1),
+        modes,
+        pairs,
         np.array([[j.kind, j.coordinate, j.motion] for j in model.joints], dtype=np.int64).reshape(-1, 3),
         np.array([j.axis for j in model.joints], dtype=np.float64).reshape(-1, 3),
         track,
@@ -87,7 +105,7 @@ def system_of(model: FloatingModel) -> System:
         bands_of(model),
         _drives(model),
         np.array([np.any(body.shapes != 0.0, axis=(0, 2)) for body in model.bodies.values()]).reshape(B, 3),
-        np.ascontiguousarray(np.argwhere(np.abs(pairs).max(axis=3) > ROUNDING)),
+        np.ascontiguousarray(np.argwhere(np.abs(pairs).reshape(B, n, n, -1).max(axis=3) > ROUNDING)),
         False,
         model.study.initial == "equilibrium",
     )

@@ -50,18 +50,21 @@ def lacking(model: FloatingModel, name: str) -> Array:
 
 
 def softened_by_weight(model: FloatingModel, name: str) -> float:
-    """By how much of its stiffness the weight that a body bears stiffens or softens it at most, carriages at the end of
-    its track, with the study's own numbers; 0 of one that is not turned."""
+    """By how much of its stiffness the weight that a body bears stiffens or softens one that stands, carriages at the
+    end of its track, with the study's own numbers."""
+    from scipy.spatial.transform import Rotation
+
     body, study = model.bodies[name], model.study
-    if body.shortening is None or not study.gravity or not any(model.frame(name).turned):
+    if body.shortening is None or not body.omega.size:
         return 0.0
+    pull = study.gravity * Rotation.from_rotvec(model.frame(name).turned).as_matrix()[2, : body.shortening.axes]
     borne = sum(_carried(model, other) for other in model.bodies if model.frame(other).on == name)
     for carriage, own in study.carriage.items():
         if name in model.carriers(own.on):
             borne += sum(float(study.value(f"carriage.{carriage}.{key}") or 0.0) for key in own.masses)
     whole = body.shortening.integrals[0] + borne * body.shortening.along(np.array([body.length]))[0, 0]
-    ratios = study.gravity * whole / np.multiply.outer(body.omega, body.omega)
-    return float(max(np.abs(np.linalg.eigvalsh(ratio)).max() for ratio in ratios))
+    ratio = np.einsum("a,aij->ij", pull, whole) / np.multiply.outer(body.omega, body.omega)
+    return float(np.abs(np.linalg.eigvalsh(ratio)).max())
 
 
 def buckling_ratios(model: FloatingModel, table: Lane, signals: Array) -> Array:

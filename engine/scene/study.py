@@ -13,7 +13,7 @@ from pydantic import AfterValidator, Field, PrivateAttr, ValidationError
 
 from engine.bodies import BODIES, AnyBody
 from engine.bodies.modal.description import Recorded, Spots
-from engine.bodies.modal.section_doubts import Doubt, damping_doubt, gravity_doubt
+from engine.bodies.modal.section_doubts import Doubt, damping_doubt
 from engine.scene.carriages import AnyCarriage
 from engine.scene.dotted_keys import numbers_in, value_in, values_by_key, with_value
 from engine.scene.frames import Frame, inertia_checks
@@ -206,7 +206,6 @@ class Study(Scene):
 
     def doubts(self) -> Iterator[Doubt]:
         """Conditions that its numbers may break, but are hardly meant to."""
-        yield gravity_doubt()
         for name, body in self.body.items():
             yield from body.doubts(f"body.{name}")
             if isinstance(body.damping_ratio, float):
@@ -314,11 +313,9 @@ def study_of(given: Study | str | Path) -> Study:
 
 
 def _no_study(given: object, expected: str) -> BadInput:
-    what, remedy = (
-        "this is no study",
-        "engine.Study(**tables) takes the tables of a dict, engine.load(path) those of a file",
-    )
-    return BadInput(what, where="study", expected=expected, received=f"a {type(given).__name__}", remedy=remedy)
+    remedy = "engine.Study(**tables) takes the tables of a dict, engine.load(path) those of a file"
+    received = f"a {type(given).__name__}"
+    return BadInput("this is no study", where="study", expected=expected, received=received, remedy=remedy)
 
 
 def load_recorded(text: str, recorded: Mapping[str, Recorded]) -> Study:

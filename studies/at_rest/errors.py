@@ -1,9 +1,10 @@
 """Estimated errors of studies at rest: the same scene once more, with bodies that are closer to what they stand for.
 
-Every body has twice the modes there and twice the elements, and what the kept modes miss is added. Frequencies with
-static correction converge with a third order or more, those of elements with the fourth; so `REST` of the difference is
-what is left of a second order, and of these up to a third more than the error: on beams of 2 to 16 modes and portals of
-2 to 4 elements a member 1.02 to 1.33 times the true one. Statics with the correction are exact but for rounding.
+Every body has twice the modes there and twice the elements, is not reduced by an `interface`, and what the kept
+modes miss is added. Frequencies with static correction converge with a third order or more, those of elements with the
+fourth; so `REST` of the difference is what is left of a second order, and of these up to a third more than the error:
+on beams of 2 to 16 modes and portals of 2 to 4 elements a member 1.02 to 1.33 times the true one. Statics with the
+correction are exact but for rounding.
 """
 
 from __future__ import annotations
