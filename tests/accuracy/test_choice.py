@@ -165,6 +165,7 @@ def test_errors_that_do_not_rise_with_vibration_are_told_as_they_were_foreseen(n
 
 
 @pytest.mark.fault
+@pytest.mark.slow
 def test_modes_are_judged_by_steps_enough() -> None:
     """By average acceleration the levels of references have few: that more than three modes are of use to soft springs
     was not seen, and a twentieth missed with up to eight times the steps."""

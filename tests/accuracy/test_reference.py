@@ -290,6 +290,7 @@ def test_levels_have_more_and_more_of_the_modes_that_loads_excite() -> None:
     assert only_grid(passages(sweep={})).mode_levels == (4, 8, 16, 32, 64)
 
 
+@pytest.mark.slow
 def test_errors_of_what_a_head_beside_the_axis_pushes_are_told() -> None:
     """Of a portal whose head brakes by a lever half of the errors by the first three levels were told too small, up to
     4.6 times, as long as the head did not feel all that few modes miss under it."""

@@ -246,6 +246,7 @@ def poisoned(plan: Plan, variants: Counts, halted: Halted, group: int, beside: i
 
 
 @pytest.mark.fault(32)
+@pytest.mark.slow
 def test_a_variant_that_ends_every_process_is_found(workers: Workers, monkeypatch: pytest.MonkeyPatch) -> None:
     on_threads()  # of this process, which is not to end
     monkeypatch.setattr(chunk_of_plan, "march_chunk", poisoned)

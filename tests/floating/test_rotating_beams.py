@@ -110,6 +110,7 @@ def elastica() -> np.ndarray:
     return np.asarray(ends[:, 1] * np.cos(found[:, 0]) - ends[:, 0] * np.sin(found[:, 0]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("carried", ["carriage", "body"])
 def test_a_blade_with_a_heavy_tip_swings_after_its_spin_up_as_it_does_beyond_linear_theory(carried: str) -> None:
     """Bent by 4 % of its length meanwhile: the lag within 0.2 %, the swing that is left, 3 % of that, within 1 %."""

@@ -137,7 +137,7 @@ def column(masses: list[float], body: dict[str, object], turned: float = 90.0, *
         "frame": {"arm": {"turned": [0, f"{turned} deg", 0]}, "head": {"on": "arm"}},
         "sensor": {"tip": {"body": "arm", "at": 10.0}},
         "sweep": {"m": {"of": "body.head.mass", "values": masses}},
-        "question": {"duration": 1.0},
+        "question": {"duration": 0.1},
         "expected": ["beyond-theory"],
     }
     return Study(kind="moving-frames", gravity=9.81, **(tables | more))

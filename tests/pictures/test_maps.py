@@ -23,7 +23,7 @@ def test_each_value_of_what_is_no_motion_has_its_best_motion_in_words_and_on_a_m
     }
     moves = force(2.0, MOVE | {"jerk": 50.0, "dwell": 4.0})
     question = {"residual": {"displacement": 5e-3}}
-    damped, tables = beam(modes=1, damping_ratio=0.05), {"output": {"residual": True}, "solver": {"steps": 2000}}
+    damped, tables = beam(modes=1, damping_ratio=0.05), {"output": {"residual": True}, "solver": {"steps": 500}}
     found = studies.run(study(damped, moves, sensor=sensors, sweep=sweep, question=question, **tables))
     times, results = found.midspan_move_and_settle_time, Results.of(found)
     assert np.isfinite(times).all()
@@ -61,7 +61,7 @@ def test_each_value_of_what_is_no_motion_has_its_best_motion_in_words_and_on_a_m
 
 def test_a_map_of_stripes_or_of_one_colour_is_none() -> None:
     """A force multiplies; where it alone changes a result along its axis, or nothing does, curves say as much."""
-    tables = {"output": {"residual": True}, "solver": {"steps": 1000}}
+    tables = {"output": {"residual": True}, "solver": {"steps": 250}}
     steps = {"of": "carriage.car.motion.acceleration", "from": 2.0, "to": 16.0, "count": 8}
     swept = {"acceleration": steps, "nothing": {"of": "carriage.car.motion.dwell", "from": 1.5, "to": 1.6, "count": 8}}
     names = [one.name for one in studies.figures(studies.run(stops(sweep=swept, **tables)))]

@@ -19,6 +19,8 @@ from tests.robots.scenes import FOX_GOODWIN, marched, rail
 
 LINKS, DURATION, COUNT = (0.8, 0.6), 1.5, 3000
 LIMITS = {"speed": 6.0, "acceleration": 20.0, "jerk": 200.0}
+#: How much softer a bed is, and where the robot stands on it.
+OTHER_PLACES = [(1.0, 5.0), (20.0, 5.0), (20.0, 10.0)]
 HELD = {"west": ["x", "y", "z", "rx"], "east": ["y", "z"]}
 
 
@@ -89,7 +91,9 @@ def test_a_robot_on_a_bed_does_what_floating_frames_do(softer: float, apart: flo
     assert np.abs(np.array(own).T - tools).max() < apart * longest(record)
 
 
-@pytest.mark.parametrize(("softer", "place"), [(1.0, 5.0), (5.0, 6.0), (20.0, 5.0), (20.0, 10.0)])
+@pytest.mark.parametrize(
+    ("softer", "place"), [(5.0, 6.0), *(pytest.param(*case, marks=pytest.mark.slow) for case in OTHER_PLACES)]
+)
 def test_what_rails_leave_out_that_do_not_grow_shorter(softer: float, place: float) -> None:
     """Against floating frames of a beam that does and one that does not: told once to ten times."""
     study = swinging(softer, place, [0, 1, 0], 14, 24)

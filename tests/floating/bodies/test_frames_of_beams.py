@@ -164,6 +164,7 @@ def test_a_free_frame_keeps_its_momentum() -> None:
     assert np.log2(drifts[0] / drifts[1]) == pytest.approx(2.0, abs=0.3)
 
 
+@pytest.mark.slow
 def test_levels_have_more_and_more_modes_that_bend_the_track() -> None:
     """A boom so slender across its plane that its first four modes are one that its load excites and three that sway
     and twist beside it: with these alone it was told 1.4e-4 and off by 6e-3; beside a uniform beam."""

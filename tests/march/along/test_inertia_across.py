@@ -80,7 +80,7 @@ def test_what_is_switched_off_is_as_if_it_were_not_there() -> None:
         np.testing.assert_array_equal(off[name].values, plain[name].values)
 
 
-@pytest.mark.parametrize("kind", ["mass", "sprung mass"])
+@pytest.mark.parametrize("kind", [pytest.param("mass", marks=pytest.mark.slow), "sprung mass"])
 def test_a_portal_that_may_slide_and_turn_keeps_the_common_centre_of_mass(kind: str) -> None:
     """Pushed along beside its middle a stiff one turns about the upright; nothing holds it across, where by
     M y'' = -m D2 v its own centre and that of what it carries stay, times their masses, on one line."""

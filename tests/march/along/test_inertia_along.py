@@ -134,7 +134,7 @@ def test_what_is_switched_off_is_as_if_it_were_not_there() -> None:
     assert float(force.sway_max) < 0.2 * float(on.sway_max)
 
 
-@pytest.mark.parametrize("kind", ["mass", "sprung mass"])
+@pytest.mark.parametrize("kind", [pytest.param("mass", marks=pytest.mark.slow), "sprung mass"])
 def test_a_portal_that_may_slide_keeps_the_common_centre_of_mass(kind: str) -> None:
     """Nothing holds it along: a stiff one moves back by m/(M + m) of the way of what it carries, sprung or not."""
     stiff = {name: SECTION[name] * factor for name, factor in (("area", 1.0), ("youngs_modulus", 1e6))}
