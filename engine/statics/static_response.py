@@ -48,7 +48,9 @@ def static_readings(model: SceneModel, sensors: Sequence[Sensor], along: Along) 
             read = read + np.einsum("sm,sml->sl", *_together(loose, state.coordinate))
         found[:, j] = read
         found[:, j, -1] += sensor.sagging(model, along)
-        if sensor.under is not None and (here := along[sensor.under].here) is not None:
+        rider = sensor.rides(model)
+        # one of several contacts may be on its body while the others, and the place that moves, are not
+        if rider is not None and rider == sensor.under and (here := along[rider].here) is not None:
             found[~here, j] = 0.0
     return found
 

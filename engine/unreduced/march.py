@@ -74,7 +74,7 @@ def march_unreduced(
     check: called after every segment, to stop by what it raises. Raises BadInput as `statics_at` and `check_march`.
     """
     check_march(model)
-    march = _March(model, course, counts, level_readings(model), *_start(model, course))
+    march = _March(model, course, counts, level_state(model), *_start(model, course))
 
     def halted() -> bool:
         check()
@@ -222,7 +222,7 @@ class _March:
     model: Unreduced
     course: Course
     counts: Counts
-    level: Array
+    level: tuple[Array, Array]
     u: Array
     v: Array
     a: Array = field(init=False)
@@ -245,7 +245,8 @@ class _March:
         """What is read at the sampled stations of a segment."""
         rows = rows_sampled(segment, self.counts)
         part = table.along.some(rows >= 0)
-        return _Observed(rows, readings(self.model, part).less(self.level), part)
+        level = level_readings(self.model, self.level, part)
+        return _Observed(rows, readings(self.model, part).less(level), part)
 
     def start(self, segment: Segment, table: _Table, observed: _Observed, before: Segment | None) -> None:
         """The impulses and the new accelerations of a segment's event, and its first station."""
@@ -307,7 +308,7 @@ class _March:
                     jump[j] += float(shape[j] @ self.v[index[j]]) + float(tie.other @ self.v)
                     if tie.carriage in model.sprung:
                         place = model.sprung[tie.carriage]
-                        self.u[place], self.v[place] = level_state(model)[0][place], 0.0
+                        self.u[place], self.v[place] = self.level[0][place], 0.0
         heavy = np.array([1.0 if tie.link == "rigid" else tie.mass for tie in model.ties])
         felt = np.flatnonzero(heavy)
         if not felt.size:

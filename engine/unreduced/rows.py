@@ -153,7 +153,7 @@ class Readings:
         return np.asarray(found + self.added)
 
     def less(self, level: Array) -> Readings:
-        """The same, counted from readings (J,)."""
+        """The same, counted from readings (S, J)."""
         return Readings(self.index, self.on_u, self.on_v, self.on_a, self.on_force, self.added - level)
 
 

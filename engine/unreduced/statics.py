@@ -66,10 +66,11 @@ def level_state(model: Unreduced) -> tuple[Array, Array]:
     return states[0], forces[0]
 
 
-def level_readings(model: Unreduced) -> Array:
-    """(J,) what sensors on bodies that ride, of sprung masses and of their springs read there, 0 for the others."""
-    state, forces = level_state(model)
-    found = readings(model, nowhere(model)).at_rest(state[None], forces[None])[0]
+def level_readings(model: Unreduced, level: tuple[Array, Array], along: Along) -> Array:
+    """(S, J) what sensors on bodies that ride, of sprung masses and of their springs read in a level state at the
+    places of stations, where others ride on them; 0 for the others."""
+    state, forces = (np.broadcast_to(part, (len(along.s), part.size)) for part in level)
+    found = readings(model, along._replace(on=np.zeros_like(along.on))).at_rest(state, forces)
     rides = [
         sensor.reads.of_suspension
         or (not sensor.reads.of_contact and (sensor.carriage is not None or model.study.body_of(name) in model.loose))
@@ -82,12 +83,12 @@ def statics_at(model: Unreduced, along: Along) -> Statics:
     """Static states at stations, whatever the speed there."""
     _check_held(model)
     resting = Along.at_rest(along.s, along.on, model.riders)
-    level, solver = level_readings(model), StaticSolver(model)
+    level, solver = level_state(model), StaticSolver(model)
     sensors, forces, states = [], [], []
     for first in range(0, len(along.s), STATIONS):
         part = resting.some(slice(first, first + STATIONS))
         state, force = solver.solve(part, model.weight)
-        sensors.append(readings(model, part).less(level).at_rest(state, force))
+        sensors.append(readings(model, part).less(level_readings(model, level, part)).at_rest(state, force))
         forces.append(force)
         states.append(state)
     return Statics(*(np.concatenate(found) for found in (sensors, forces, states)))

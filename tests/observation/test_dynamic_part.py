@@ -1,5 +1,6 @@
 """The dynamic part of what sensors read: a closed form, the whole less statics, the unreduced model, refusals."""
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from engine.unreduced.comparison import Compared, compare_variant
 from results_schema.errors import BadInput
 from studies.reporting import summary
 from studies.results.results import Results
+from tests.engine.bodies_on_contacts import riding
 from tests.engine.build import Table, beam, cruise, fixed, force, mass, study, study_of_steps, under
 from tests.unreduced.test_unreduced import ABOARD, SPRINGS, TABLE_SECTION, frame, scene, with_table
 
@@ -82,6 +84,18 @@ def test_it_is_the_whole_less_statics_by_both_models(name: str) -> None:
         assert other == pytest.approx(left, abs=2e-2 * size, nan_ok=True)  # most where loads come at once
         assert not np.nan_to_num(found.marched_static[place]).any()
         assert not np.nan_to_num(found.unreduced_static[place]).any()
+
+
+def test_that_of_a_contact_counts_from_its_own_static_force_wherever_the_place_that_moves_is() -> None:
+    """With the reference off the bed its whole force was told as the dynamic part of a contact on it."""
+    for reference in (0.2, 0.0, 0.4):
+        way = cruise(reference - 0.35, 1.0 + reference - 0.05, 0.6)
+        given = riding(way).with_values({"carriage.car.reference": reference, "initial": "equilibrium"})
+        contacts = {name: sensor for name, sensor in given.data["sensor"].items() if "contact" in sensor}
+        found = engine.run(given.with_values({"sensor": parts(contacts)}))
+        for name, end in itertools.product(("rear", "front"), ("max", "min")):
+            part = float(found[f"{name}_{end}"]) - 0.25 * given.gravity
+            assert float(found[f"{name}_part_{end}"]) == pytest.approx(part, rel=1e-9)
 
 
 def test_nothing_is_left_where_loads_rest() -> None:
