@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from engine.scene.sensors import Sensor
+from engine.scene.study import Study
 from results_schema.arrays import Array, Mask
 from studies.findings.absolute_errors import absolute_errors, told_error, weight
 from studies.findings.amplification import sizes
@@ -20,6 +21,10 @@ from studies.results.results import Results
 
 MOST_GROUPS = 5
 BEYOND = "The equations assume contact: beyond, they say no more."
+PRESSED = (
+    "What moves with a body on contacts as its wheels do ({}) is pressed down by these too, which is not counted: "
+    "bilateral = true holds it."
+)
 LEVEL = (
     "may only seem to: contacts at one place of a track that lies across stay level, as nothing there turns, and bear "
     "what the track under them bends by; a frame with a point at each of them pitches."
@@ -52,15 +57,17 @@ def told_low_contacts(results: Results, least: float | None) -> list[str]:
     others = [name for name in parts if name != lowest and below[name].any()]
     also = f" So {'do those' if len(others) > 1 else 'does that'} of {listed(others[:MOST_TOLD])}" if others else ""
     also += f" and {len(others) - MOST_TOLD} more." if len(others) > MOST_TOLD else "." * bool(also)
-    said = f"falls below {number(least)} of its weight {where(results, below[lowest], results.axis(*PACES))}"
+    of = "an equal share of its weight" if len(results.study.carriage[lowest].riding_contacts) > 1 else "its weight"
+    said = f"falls below {number(least)} of {of} {where(results, below[lowest], results.axis(*PACES))}"
     smallest = f"at its smallest it is {number(float(parts[lowest][place]))} of it{in_words(results, place)}"
     return [f"The contact force of {lowest} {said}; {smallest}{ASIDE if _is_read(results) else ''}.{also}"]
 
 
 def _part_of_weight(results: Results, carriage: str) -> Array:
-    """Smallest contact forces over the weight, in the sweep's shape; NaN where there is none."""
+    """Smallest contact forces over the weight, or over the share of it that each of several contacts has, in the
+    sweep's shape; NaN where there is none."""
     force, own = results.everywhere(results.dataset[f"{carriage}_contact_force_min"]), weight(results, carriage)
-    weights = results.everywhere(own)
+    weights = results.everywhere(own) / max(1, len(results.study.carriage[carriage].riding_contacts))
     return np.asarray(np.divide(force, weights, out=np.full(results.shape, np.nan), where=weights > 0.0))
 
 
@@ -157,7 +164,22 @@ def _lifted(results: Results, opened: dict[str, tuple[Mask, Mask]]) -> str:
     also = f" So would {listed(more)}." if more else ""
     level = [name for name in opened if results.study.carriage[name].level_contacts]
     why = f" {listed(level[:MOST_TOLD])} {LEVEL}" if level else ""
+    wheels = [name for name in opened if _keeps_pace(results.study, name)]
+    why += f" {PRESSED.format(listed(wheels[:MOST_TOLD]))}" if wheels else ""
     return f"{_onset(results, first, *masks)}{also} {BEYOND}{why}"
+
+
+def _keeps_pace(study: Study, carriage: str) -> bool:
+    """Whether a body on contacts moves as a carriage does, behind it or ahead, as a coach with its wheels."""
+    own = study.carriage[carriage]
+    motion, ends = own.motion.model_dump(), {"start", "end"}
+    for name, other in study.carriage.items():
+        theirs = other.motion.model_dump()
+        if name != carriage and other.riding_contacts and own.on in other.ridden and motion.keys() == theirs.keys():
+            apart = {round(motion[key] - theirs[key], 6) for key in ends & motion.keys()}
+            if len(apart) <= 1 and all(motion[key] == theirs[key] for key in motion.keys() - ends - {"after"}):
+                return True
+    return False
 
 
 def _kept(results: Results, forces: dict[str, Array]) -> list[str]:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import engine
 import studies
 from engine.scene.study import Study
 from results_schema.errors import BadInput
@@ -22,6 +23,7 @@ from tests.kinds.test_residual import stops
 from tests.studies import scenes
 
 OPENED = 2  # of four variants
+WHEEL = {"kind": "cruise", "end": 13.0, "speed": 1.0}  # of a coach, if it starts 1.5 m ahead of it
 
 
 def opened(kind: str, **values: float) -> xr.Dataset:
@@ -79,6 +81,38 @@ def test_where_a_contact_force_falls_below_a_part_of_the_weight() -> None:
     assert f"falls below 0.9 of its weight {where}; nowhere from 1 to 12 m/s (mass 1 kg); " in said
     assert said.endswith("; at its smallest it is -0.2 of it at pace 12 m/s, mass 20 kg.")
     assert not any("of its weight" in text for text in answers.answer(scenes.run("passage", fast)))
+
+
+COACH = """
+[body.coach]
+kind = "rigid"
+length = 4.0
+mass = 300.0
+inertia = 400.0
+
+[carriage.coach]
+on = "bed"
+kind = "body"
+body = "coach"
+contacts.front = { at = 3.5, stiffness = 1e5, damping = 1e3 }
+contacts.rear = { at = 0.5, stiffness = 1e5, damping = 1e3 }
+motion = { kind = "cruise", start = -1.5, end = 11.5, speed = 1.0 }
+"""
+
+
+def test_what_presses_a_wheel_down_besides_itself_is_told_and_each_contact_has_its_share() -> None:
+    """Wheels of a coach "would lift off" without a word of it; at rest neither contact bore half of its weight."""
+    text = scenes.text_of("passage", scenes.pace("passage"), extra=f"{COACH}\n[question]\nleast_contact = 0.5")
+    for start, told in ((0.0, True), (0.1, False)):
+        study = engine.load(text).with_values({"carriage.table.motion": WHEEL | {"start": start}})
+        found = studies.run(study.without_sweep())
+        found["table_contact_force_min"].values[...] = -1.0
+        found["coach_contact_force_min"].values[...] = 0.8 * 0.5 * 300.0 * study.gravity
+        ((said,), _) = told_contacts(Results.of(found))
+        assert said.startswith("table would lift off") and ("as its wheels do (table)" in said) == told
+    found["table_contact_force_min"].values[...] = 1e6
+    (low,) = (one for one in answers.answer(found) if one.startswith("The contact force of coach"))
+    assert "below 0.5 of an equal share of its weight nowhere" in low and "at its smallest it is 0.8 of it" in low
 
 
 def test_a_least_contact_where_nothing_presses_by_its_weight_is_refused() -> None:
