@@ -10,7 +10,15 @@ import numpy as np
 
 from engine.kernels.schemes import SCHEMES
 from engine.march.envelopes import envelope_tables
-from engine.march.step_rules import are_soft, free_limit, free_steps, least_steps, limit_with_springs, vibrates_freely
+from engine.march.step_rules import (
+    are_soft,
+    contact_steps,
+    free_limit,
+    free_steps,
+    least_steps,
+    limit_with_springs,
+    vibrates_freely,
+)
 from engine.march.tables import SceneTables
 from engine.model.numerics import open_bodies
 from engine.model.scene_model import with_numerics
@@ -40,6 +48,7 @@ KEPT_CYCLE = 256 * 2**20  # of a cycle's tables: ten of 64 modes x 102,400 steps
 #: Steps per first period, up to which sweeps of a sprung mass on stiff springs took a third of the work that average
 #: acceleration took; at ten times as many 9 of 192 references have no estimate.
 CLOSE_STEPS = 20_000
+SLOWLY, ON_IT = 8, 1e-9  # steps of a contact's period in one of the grid's; m or alike: a rider so near is on its body
 LEAST_FREE = 8  # steps per first period of free vibration: what the coarsest march of such passages had
 
 
@@ -196,11 +205,15 @@ def unit_steps(scene: SceneModel) -> int:
 def open_scheme(grid: SceneGrid) -> Scheme:
     """The scheme of a study that leaves it open: Fox-Goodwin's, whose fast modes take mass; average acceleration, which
     has no limit, where springs are stiff: beside modes in free vibration, or so that their limit asks for more steps
-    than it is worth."""
+    than it is worth; one that damps where carriages move so slowly, and are not dropped, that periods of their contacts
+    are short steps."""
     if not grid.scene.springs:
         return SCALED_FOX_GOODWIN
     fewest = grid.mode_levels[0] if open_bodies(grid.scene.study) else 0
     model = grid.model(grid.scene.numerics._replace(scheme=SCALED_FOX_GOODWIN, modes=fewest))
+    dropped = grid.scene.study.start == "rest" and any(rider.touches(0.0, ON_IT) for rider in model.riders)
+    if not dropped and np.any(contact_steps(model, grid.values) > SLOWLY * unit_steps(grid.scene)):
+        return DAMPED
     if any(vibrates_freely(carriage) for carriage in model.carriages) and not are_soft(model, grid.values):
         return AVERAGE_ACCELERATION
     close = CLOSE_STEPS * grid.values.scene_time_scale * model.first_omega / (2.0 * np.pi)
@@ -209,3 +222,4 @@ def open_scheme(grid: SceneGrid) -> Scheme:
 
 AVERAGE_ACCELERATION = SCHEMES["average-acceleration"]({})
 SCALED_FOX_GOODWIN = SCHEMES["scaled-fox-goodwin"]({})
+DAMPED = SCHEMES["hht-alpha"]({"alpha": -0.05})

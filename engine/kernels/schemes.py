@@ -19,6 +19,7 @@ from engine.kernels.layout import Alpha, FloatArray, Newmark
 # the march under a moving mass: measured, HHT-alpha -0.03, generalized-alpha 0.7 and gamma 0.53 do (growth at most 1.01
 # with 0.3 to 1.1 times the rule's steps), -0.02, 0.85 and 0.52 do not (1.07 to 1.17).
 _JUDGED_AT, _DAMPED = 5.0, 0.96
+_FAR_BEYOND, _DAMPED_CONTACTS = 1e4, 0.906  # what HHT-alpha leaves with -0.05; with -0.02 contacts grow
 _FAR = 1e100  # omega h beyond which nothing changes, and whose square is a number
 
 
@@ -228,6 +229,11 @@ class AlphaScheme:
 def is_damped(scheme: Scheme) -> bool:
     """Whether it damps high frequencies so much that a moving mass needs no alias rule."""
     return float(np.abs(np.linalg.eigvals(scheme.amplification(_JUDGED_AT))).max()) <= _DAMPED
+
+
+def damps_contacts(scheme: Scheme) -> bool:
+    """Whether it damps what is far faster than its step so much that steps may be longer than periods of contacts."""
+    return float(np.abs(np.linalg.eigvals(scheme.amplification(_FAR_BEYOND))).max()) <= _DAMPED_CONTACTS
 
 
 def hht_alpha(alpha: float) -> AlphaScheme:

@@ -6,11 +6,15 @@ import numpy as np
 import pytest
 
 import studies
-from engine.accuracy.grids import SCALED_FOX_GOODWIN
+from engine.accuracy.grids import DAMPED, SCALED_FOX_GOODWIN
 from engine.accuracy.reference import in_full
+from engine.batch.plan import make_plan
+from engine.march.step_rules import contact_omega
 from engine.scene.study import Study
-from results_schema.status import Status
+from engine.scene.variants import VariantValues
+from results_schema.status import SchemeUsed, Status
 from tests.accuracy.passages import only_grid
+from tests.engine.bodies_on_contacts import riding as on_contacts
 from tests.engine.build import beam, cruise, fixed, study
 
 FORCE = {"force": {"carriage": "car", "contact": "front", "quantity": "contact_force"}}
@@ -55,3 +59,22 @@ def test_what_nobody_could_estimate_is_unresolved_though_nothing_is_held() -> No
     assert np.isnan(found.estimated_error).all() and np.isfinite(found.force_max)
     assert found.status == Status.UNRESOLVED
     assert any("1 unresolved" in text for text in studies.answer(found))
+
+
+def test_what_moves_slowly_on_stiff_contacts_needs_no_step_for_each_of_their_periods() -> None:
+    """A table that ran slowly along a bed took 40 s, and was unresolved; one that is dropped swings on its contacts."""
+    stiff = {name: {"at": at, "stiffness": 4e6, "damping": 50.0} for name, at in (("rear", 0.05), ("front", 0.35))}
+    slow = on_contacts(cruise(0.2, 0.8, 0.004), stiff, initial="equilibrium", solver={"tolerance": 1e-3})
+    found = studies.run(slow)
+    assert in_full(only_grid(slow)).numerics[0].scheme == DAMPED
+    assert found.status == Status.OK and found.scheme_used == SchemeUsed.HHT_ALPHA and found.steps_used < 40_000
+    model = make_plan(slow).base
+    (omega,) = contact_omega(model, VariantValues(slow, {}, 1))
+    assert omega / (2.0 * np.pi) * 0.6 / 0.004 > 2.0 * int(found.steps_used)
+    closer = studies.run(slow.with_values({"solver": {"steps": 250_000, "scheme": "average-acceleration"}}))
+    for name in ("place_max", "below_max", "front_max", "front_min"):
+        static = max(abs(float(closer[f"{name.partition('_')[0]}_{end}"])) for end in ("max", "min"))
+        off = abs(float(found[name]) - float(closer[name])) / static
+        assert off <= max(float(found.estimated_error.sel(result=name)), 1e-7), name
+    dropped = in_full(only_grid(slow.with_values({"initial": "rest"})))
+    assert dropped.numerics[0].scheme != DAMPED
