@@ -152,6 +152,25 @@ def _soft_ends(plan: Plan, name: str, modal: ModalBody) -> list[str]:
     return [f"{end:g} m" for end, here in zip((0.0, modal.length), soft & over, strict=True) if here]
 
 
+def begins_on_it(plan: Plan) -> Iterator[str]:
+    """Of what crosses and begins where a track gives way, in a study that starts in equilibrium for something else in
+    it: by itself it would come onto a body at rest."""
+    study, bodies = plan.study, {part.name: part.modal for part in plan.base.bodies}
+    if study.initial is not None or study.start != "equilibrium":
+        return
+    for tie in plan.base.carriages:
+        name, own = study.carriage[tie.name].on, study.carriage[tie.name]
+        place, places = float(own.motion.path(0.0).S), np.linspace(0.0, bodies[name].length, PLACES)
+        if own.motion.passes and 0.0 <= place <= bodies[name].length:
+            flexible = np.abs(bodies[name].influence_at(np.append(places, place), np.append(places, place)))
+            if flexible[-1] > GIVES_WAY * flexible.max():
+                yield (
+                    f"{tie.name} begins at {place:g} m of {name} with its static deflection, as a study in which "
+                    "something stands or turns starts in equilibrium: a start before the track lets it come onto it"
+                )
+                return
+
+
 def points_up(plan: Plan) -> Iterator[str]:
     """One sentence for every plain force that is negative."""
     for name, carriage in plan.study.carriage.items():
@@ -258,6 +277,7 @@ OF_WAYS_AND_LOADS = (
     ends_early,
     vanishes,
     strikes_all_modes,
+    begins_on_it,
     points_up,
     has_no_band,
     pulsates_together,

@@ -123,6 +123,11 @@ CASES = {
         beam(supports=[{"at": 0.0, "stiffness": 1e7}, {"at": 1.0, "stiffness": 50.0}]),
         sensor={"middle": fixed(0.5, "acceleration")},
     ),
+    "car begins at 0 m of bed with its static deflection, as a study in which something stands or turns": study(
+        beam(supports=[{"at": 0.0, "stiffness": 50.0}, {"at": 1.0, "stiffness": 1e7}]),
+        {"car": mass(0.1, WAY), "absorber": oscillator(0.1, 2.0, {"kind": "standing", "at": 0.5})},
+        sensor={"middle": fixed(0.5)},
+    ),
     "the force of carriage car is negative, so that it lifts: weights are positive": passing(car=force(-0.1, WAY)),
     "carriage car pulls for a part of each swing, as its amplitude, 2 N, is above its force": passing(
         car=force(1.0, WAY, pulsation={"amplitude": 2.0, "frequency": 1.0})
