@@ -123,10 +123,12 @@ def _braking(plan: Plan) -> Iterator[str]:
         remedy = f"{study.source.written(f'carriage.{tie.name}')}.inertia_along = true brings it"
     elif study.carriage[tie.name].riding_body is not None:
         remedy = "bodies on contacts never push along"
-    yield (
-        f"the force that brakes {tie.name}, up to {_newtons(force)}, does not push "
-        f"{plan.base.bodies[tie.body].name} along its track, nor bend it where the track lies beside its axis; {remedy}"
-    )
+    ridden = list(dict.fromkeys(study.carriage[tie.name].ridden))
+    its, it, axis = ("its track", "it", "the track lies beside its axis")
+    if len(ridden) > 1:
+        its, it, axis = ("their tracks", "them", "these lie beside their axes")
+    who = f"the force that brakes {tie.name}, up to {_newtons(force)}, does not push {' and '.join(ridden)}"
+    yield f"{who} along {its}, nor bend {it} where {axis}; {remedy}"
 
 
 def _braked(plan: Plan) -> tuple[int, float]:
@@ -152,7 +154,15 @@ def _along(grid: SceneGrid, number: int) -> float:
     tau = (bounds[:-1, None] + np.diff(bounds)[:, None] * np.linspace(0.0, 1.0, MOMENTS)).ravel()
     pace = grid.scene.carriages[number].rider.pace / _time_scale(grid)
     largest = max(float(np.abs(motion.path(tau, side).ddS).max()) for side in ("left", "right"))
-    return largest * float(grid.values.in_si("N", moving_mass(grid.scene, grid.values, number) * pace**2).max())
+    moved = [moving_mass(grid.scene, grid.values, one) for one in (number, *_carried(grid, number))]
+    return largest * float(grid.values.in_si("N", sum(moved) * pace**2).max())
+
+
+def _carried(grid: SceneGrid, number: int) -> list[int]:
+    """Carriages on the body that a carriage brings."""
+    study, ties = grid.scene.study, grid.scene.carriages
+    brought = study.carriage[ties[number].name].riding_body
+    return [one for one, tie in enumerate(ties) if brought is not None and study.carriage[tie.name].on == brought]
 
 
 def doubtful(study: Study, cases: Cases) -> Iterator[str]:

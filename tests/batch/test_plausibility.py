@@ -9,6 +9,7 @@ from engine.batch.plausibility import REMARKS, remarks
 from engine.scene.study import Study
 from tests.batch.test_plan import swept
 from tests.engine.build import beam, cruise, fixed, force, mass, oscillator, shuttle, study
+from tests.engine.gantries import gantry
 from tests.studies.at_rest import PORTAL
 
 WAY = cruise(0.0, 1.0, 0.5)
@@ -207,6 +208,13 @@ def test_forces_that_brake_and_do_not_push_are_remarked(braked: Study, words: st
     """Where residual vibration is asked for: it would be larger by what rings along the track."""
     told = [sentence for sentence in remarks(make_plan(braked)) if sentence.startswith(BRAKING)]
     assert len(told) == bool(words) and all(words in sentence for sentence in told)
+
+
+def test_what_a_gantry_carries_is_braked_with_it() -> None:
+    """The girder alone was told, and one of its two tracks."""
+    crane = gantry(motion=STOP | {"start": 0.3, "end": 0.7}, output={"residual": True})
+    (told,) = (sentence for sentence in remarks(make_plan(crane)) if "brakes crane" in sentence)
+    assert "up to 2.2 N, does not push left and right along their tracks" in told  # (0.8 + 0.3) kg, 2 m/s2
 
 
 def test_braking_on_frames_is_remarked_once() -> None:
