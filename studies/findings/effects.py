@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from math import prod
 from typing import NamedTuple
 
 import numpy as np
@@ -73,6 +74,46 @@ def told_effects(results: Results, values: Array, what: str, error: Array | floa
     own.sort(key=lambda axis: -float(lines[axis][0].max() / lines[axis][0].min()))
     told = [_effect(axis, *lines[axis]) for axis in own]
     return f"With the worst of all else that is swept, {what} {listed(told)}." if told else ""
+
+
+class Choice(NamedTuple):
+    """The least of a largest value over what is there to choose, where that is, and that it is at the worst of all else
+    where anything else is swept."""
+
+    value: float
+    where: str
+    end: str
+
+
+def of_what_stands(results: Results) -> list[Axis]:
+    """The swept numbers of carriages that stand, as absorbers do."""
+    ranges = {name: one.motion.range() for name, one in results.study.carriage.items()}
+    stands = tuple(f"carriage.{name}." for name, (low, high) in ranges.items() if low == high)
+    return [axis for axis in results.axes if all(path.startswith(stands) for path in axis.paths)]
+
+
+def best_choice(results: Results, values: Array, free: Sequence[Axis]) -> Choice | None:
+    """For which of some swept numbers positive values (in the sweep's shape) are least at the worst of all others; None
+    where there are no more than two to choose from, or all are alike, or others are swept in samples with them."""
+    varied = [axis for axis in results.axes if axis.values.size > 1]
+    free = [axis for axis in varied if axis in free]
+    sampled = VARIANT in results.dims
+    if (
+        not free
+        or (sampled and free != varied)
+        or prod(dict((axis.dim, axis.values.size) for axis in free).values()) <= 2
+    ):
+        return None
+    own = {results.dims.index(axis.dim) for axis in free}
+    others = tuple(n for n in range(values.ndim) if n not in own)
+    worst = np.where(results.with_values & np.isfinite(values), values, np.inf).max(axis=others, keepdims=True)
+    place = np.unravel_index(int(np.argmin(worst)), worst.shape)
+    least, most = float(worst[place]), float(worst.max(initial=0.0, where=np.isfinite(worst)))
+    if not np.isfinite(least) or least > (1.0 - ALIKE) * most:
+        return None
+    where = ", ".join(axis.at(int(place[results.dims.index(axis.dim)])) for axis in free)
+    end = " at the worst of all else" if prod(values.shape[n] for n in others) > 1 else ""
+    return Choice(least, where, end)
 
 
 class BothWays(NamedTuple):

@@ -14,7 +14,7 @@ from results_schema.arrays import Array, Mask
 from studies.findings.absolute_errors import absolute_errors, told_error
 from studies.findings.amplification import only_rounding, sizes
 from studies.findings.beyond import LIMITED, AskedOfRest, Limits, in_turns, out_of_reach, where_beyond
-from studies.findings.effects import by_effect, told_both_ways, told_effects
+from studies.findings.effects import best_choice, by_effect, of_what_stands, told_both_ways, told_effects
 from studies.results.axes import DIRECTION, VARIANT, Axis
 from studies.results.findings_common import in_words, while_held
 from studies.results.formatting import ROUNDING, counted, listed, once, quantity
@@ -204,21 +204,10 @@ def _residual(results: Results, sensor: str, asked: AskedOfRest) -> str:
 
 
 def _told_least(results: Results, values: Array, units: str) -> str:
-    """At which motions or delays it swings least, at the worst of what is not there to choose, behind where most; ""
-    where there are no more than two to choose from, or all are alike."""
-    free = [axis for axis in results.axes if axis.sets_motion and axis.values.size > 1 and not axis.sets(DIRECTION)]
-    if VARIANT in results.dims or prod(axis.values.size for axis in free) <= 2:
-        return ""
-    own = {results.dims.index(axis.dim) for axis in free}
-    others = tuple(n for n in range(values.ndim) if n not in own)
-    worst = np.where(results.with_values & np.isfinite(values), values, np.inf).max(axis=others, keepdims=True)
-    place = np.unravel_index(int(np.argmin(worst)), worst.shape)
-    least, most = float(worst[place]), float(worst.max(initial=0.0, where=np.isfinite(worst)))
-    if not np.isfinite(least) or least > (1.0 - ALIKE) * most:
-        return ""
-    where = ", ".join(axis.at(int(place[results.dims.index(axis.dim)])) for axis in free)
-    end = " at the worst of all else" if prod(values.shape[n] for n in others) > 1 else ""
-    return f", and least, by up to {quantity(least, units)}{end}, at {where}"
+    """At which motions, delays or absorbers it swings least, behind where most; "" where `best_choice` finds none."""
+    free = [axis for axis in results.axes if axis.sets_motion and not axis.sets(DIRECTION)]
+    found = best_choice(results, values, [*free, *of_what_stands(results)])
+    return f", and least, by up to {quantity(found.value, units)}{found.end}, at {found.where}" if found else ""
 
 
 def _told_between(results: Results, values: Array, place: Index) -> str:

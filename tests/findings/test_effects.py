@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -12,6 +14,7 @@ from studies.findings.amplification import sizes
 from studies.findings.effects import told_both_ways, told_effects, unchanged
 from studies.reporting import answers
 from studies.results.results import Results
+from tests.engine.build import beam, cruise, fixed, mass, oscillator, study
 from tests.studies import scenes
 
 MASS = 'mass = { of = "carriage.table.mass", values = [200, 50, 100] }'
@@ -174,3 +177,22 @@ def test_a_study_of_frames_draws_its_sweep_and_no_rounding_of_its_energy() -> No
     dataset["energy_change"].values[...] = 1e-12
     titles = [figure.title for figure in answers.figures(dataset)]
     assert "The energy of everything does not change" in titles
+
+
+@pytest.mark.parametrize("more", ["", "zip"])
+def test_the_absorber_that_helps_most_is_told(more: str) -> None:
+    """At the worst of all else, or among samples of it alone; the answer told the worst one."""
+    sweep: dict[str, Any] = {"stiffness": {"of": "carriage.absorber.stiffness", "values": [0.5, 2.0, 4.0]}}
+    if more == "zip":
+        sweep["damping"] = {"of": "carriage.absorber.damping", "values": [0.1, 0.2, 0.3]}
+        sweep["zip"] = ["stiffness", "damping"]
+    else:
+        sweep["speed"] = {"of": "carriage.car.motion.speed", "values": [0.2, 0.4]}
+    standing = {"kind": "standing", "at": 0.5}
+    cars = {"car": mass(0.1, cruise(0.0, 1.0, 0.5)), "absorber": oscillator(0.1, 2.0, standing, damping=0.1)}
+    found = studies.run(study(beam(), cars, sensor={"middle": fixed(0.5)}, sweep=sweep))
+    found["middle_min"].values[...] = 0.0
+    found["middle_max"].values[...] = [5.0, 3.0, 4.0] if more else [[1.0, 5.0], [2.0, 3.0], [0.5, 4.0]]
+    (said,) = (text for text in studies.answer(found) if text.startswith("middle: the largest displacement"))
+    where = "at stiffness 2 N/m, damping 0.2 N s/m." if more else "at the worst of all else, at stiffness 2 N/m."
+    assert f"The largest displacement is least, 3 m{',' if more else ''} {where}" in said
