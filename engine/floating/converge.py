@@ -143,6 +143,7 @@ def converge(
     some_held = np.any(np.isfinite([result.tolerance for result in results]))
     # where nothing is held, the steps that a study fixes are its own affair
     unresolved = np.isnan(held) & (some_held or study.solver.steps == "auto")
+    unresolved |= np.isnan(error[np.isfinite([result.tolerance for result in results])]).any(axis=0)
     missed = np.where(held > 1.0, np.int8(Status.TOLERANCE_MISSED), np.int8(Status.OK))
     status = np.where(unresolved, np.int8(Status.UNRESOLVED), missed)
     error[:, lost(found.status)] = np.nan

@@ -78,7 +78,8 @@ def choose(study: Study, pilots: VariantValues, duration: Array, longest: float)
     stiffened, by_lack = _those_that_stiffen(own, modes)
     study, own = _stiffened(study, stiffened), own.stiffened(stiffened)
     if stiffened:  # modes that were enough without
-        modes, left_out = _enough_modes(own, min(modes, MOST_MODES // MORE_MODES))
+        again = _enough_modes(own, min(modes, MOST_MODES // MORE_MODES))
+        modes, left_out = again if np.isfinite(again[1]).all() else (modes, left_out)
     left_out = left_out + by_lack
     level = next(iter(levels(study, longest, modes)))
     model, results = level.model, results_of(level.model)
@@ -141,18 +142,24 @@ def _by_lack_of_stiffening(pilots: Pilots, modes: int, names: tuple[str, ...]) -
 
 def _enough_modes(pilots: Pilots, first: int = FIRST_MODES) -> tuple[int, Array]:
     """The fewest modes, of so many at first, whose error is a small part of the tolerance, or the most, and that error
-    (R,); infinite where no pilot can be marched with the steps of the coarsest levels."""
+    (R,); those that any pilot can be marched with, where none can with more and the steps of the coarsest levels."""
     model = build(pilots.study, FIRST_MODES)
     nothing = np.zeros(len(results_of(model)))
     if not model.is_open:
         return FIRST_MODES, nothing
-    tried = (_enough_by(pilots, first, usual_steps(model, pilots.longest) * factor) for factor in FINER)
-    return next((found for found in tried if found is not None), (MOST_MODES, nothing + np.inf))
+    found = MOST_MODES, nothing + np.inf
+    for factor in FINER:
+        all_marched, modes, left_out = _enough_by(pilots, first, usual_steps(model, pilots.longest) * factor)
+        found = (modes, left_out) if all_marched or np.isfinite(left_out).all() else found
+        if all_marched:
+            break
+    return found
 
 
-def _enough_by(pilots: Pilots, modes: int, steps: int) -> tuple[int, Array] | None:
-    """The same by marches of so many steps, whose own error is in all of them; None where no pilot gets through."""
-    coarse, change = None, np.array(np.nan)
+def _enough_by(pilots: Pilots, modes: int, steps: int) -> tuple[bool, int, Array]:
+    """The same by marches of so many steps, whose own error is in all of them; first whether some pilot gets through
+    all of them. Else these are the last modes with which one does; their error is infinite where none tells it."""
+    coarse, change, told = None, np.array(np.nan), np.full(len(results_of(build(pilots.study, modes))), np.inf)
     while True:
         model = build(pilots.study, modes)
         fine = pilots.march(model, steps)
@@ -161,15 +168,15 @@ def _enough_by(pilots: Pilots, modes: int, steps: int) -> tuple[int, Array] | No
             left = left_over(apart, change)
             known = ~np.isnan(left).any(axis=0)
             if not known.any():
-                return None
+                return False, modes // MORE_MODES, told
             within = known & (fine.status != Status.BEYOND_THEORY)  # such as what nearly buckles, of many that do not
             known = within if within.any() else known
             before = worst(apart + left, results_of(model), pilots.values)
             if (before[known] <= PART).all():
-                return modes // MORE_MODES, (apart + left)[:, known].max(axis=1)
+                return True, modes // MORE_MODES, (apart + left)[:, known].max(axis=1)
+            told, change = left[:, known].max(axis=1), apart
             if modes >= MOST_MODES:
-                return modes, left[:, known].max(axis=1)
-            change = apart
+                return True, modes, told
         modes, coarse = modes * MORE_MODES, fine
 
 
@@ -184,7 +191,8 @@ def _by_fixed_modes(pilots: Pilots, modes: int) -> Array:
     for factor in FINER:
         fixed, twice, four = with_more_modes(pilots, modes, factor)
         change = differences(model, fixed, twice)
-        found = change + left_over(differences(model, twice, four), change)
+        left = left_over(differences(model, twice, four), change)
+        found = change + np.where(np.isnan(left), left_over(change, np.full_like(change, np.nan)), left)
         if not np.isnan(found).all(axis=1).any():
             break
     return found
