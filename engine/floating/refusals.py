@@ -139,7 +139,7 @@ def refuse_model(model: FloatingModel) -> None:
 
 def _check_held(model: FloatingModel) -> None:
     """A frame sits where the shapes of its body vanish, unless that moves freely or has supports elsewhere, and a joint
-    that is driven or controlled about an axis holds the track's direction."""
+    that is driven or controlled about an axis holds the track's direction; what is pinned there alone turns freely."""
     for name, body in model.bodies.items():
         joints = model.frame(name).joints
         if not body.omega.size or not body.slender or any(isinstance(joint, Free) for joint in joints):
@@ -156,6 +156,12 @@ def _check_held(model: FloatingModel) -> None:
             what = "a joint that is driven or controlled holds the track's direction: shapes must not turn there"
             remedy = "a rigid body on the joint that carries this one, for a beam in a cradle"
             raise fault(here, what, expected="clamped at its beginning", remedy=remedy)
+        pinned = (
+            body.modal is not None and body.modal.rigid_modes and np.abs(at[ABOUT_X:]).max() * body.length > HELD * far
+        )
+        if pinned and not any(joint.turns_freely for joint in joints):
+            what = "it turns about its pin, and no joint lets it turn without a motion, a spring or a damper"
+            raise fault(here, what, expected="clamped at its beginning, or such a joint")
 
 
 def _check_rolling(model: FloatingModel) -> None:

@@ -77,6 +77,11 @@ class Joint(SpecOfKind):
         return None
 
     @property
+    def turns_freely(self) -> bool:
+        """Whether what it holds turns by itself, without a motion, a spring or a damper."""
+        return self.turns
+
+    @property
     def at_start(self) -> tuple[Array, Array]:
         """Rotation vector (3,), rad, and shift (3,), m, of what it holds at time 0, in the axes of what it hangs on."""
         return np.zeros(3), np.zeros(3)
@@ -118,6 +123,10 @@ class AxisJoint(Joint):
         value = self.motion.at_start if self.motion is not None and self.is_driven else self.start or 0.0
         along = value * np.array(self.axis) / np.linalg.norm(self.axis)
         return along * self.turns, along * (not self.turns)
+
+    @property
+    def turns_freely(self) -> bool:
+        return self.turns and self.motion is None and not self.stiffness and not self.damping
 
     @model_validator(mode="after")
     def _start_of_motion(self) -> AxisJoint:

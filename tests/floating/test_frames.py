@@ -178,6 +178,24 @@ def test_a_frame_sits_where_shapes_vanish() -> None:
         build(arm({"joints": [SPIN_UP]}, supports="free-clamped"))
 
 
+@pytest.mark.parametrize("holds", [{"stiffness": 800.0}, {"damping": 5.0}])
+def test_what_turns_about_a_pin_has_no_spring_or_damper_there(holds: dict[str, float]) -> None:
+    """Its torque never bent pinned shapes, which turn by themselves: 1e-9 nm were told where 11 mm are true."""
+    hinge = {"kind": "revolute", "axis": [0, 1, 0]}
+    with pytest.raises(BadInput, match="no joint lets it turn without a motion, a spring or a damper"):
+        build(arm({"joints": [hinge | holds]}, supports="pinned-free"))
+    build(arm({"joints": [hinge]}, supports="pinned-free"))
+
+
+def test_a_pin_on_a_slide_needs_a_hinge() -> None:
+    """It would swing freely, and was told to bend by a fortieth of a clamped one."""
+    slide = {"kind": "prismatic", "axis": [0, 0, 1], "motion": {"kind": "minimum-jerk", "end": 1.0, "time": 0.6}}
+    with pytest.raises(BadInput, match="it turns about its pin, and no joint"):
+        build(arm({"joints": [slide]}, supports="pinned-free"))
+    build(arm({"joints": [slide]}, supports="pinned-pinned"))
+    build(arm({"joints": [slide, {"kind": "revolute", "axis": [0, 1, 0]}]}, supports="pinned-free"))
+
+
 @pytest.mark.parametrize("controlled", [False, True])
 def test_what_is_driven_holds_the_direction_of_its_track(controlled: bool) -> None:
     """Pinned shapes turn where a motion turns them; about another axis, or behind a free hinge, nothing holds them."""
