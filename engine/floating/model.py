@@ -155,7 +155,8 @@ def build(study: Study, modes: int | None = None) -> FloatingModel:
         if carriage.suspension is not None:
             springs[name], size = size, size + 1
     if size == 0:
-        raise study.source.fault("frame", "nothing here can move by itself", expected="a joint, a mode")
+        what = "nothing here can move by itself: all joints are driven, and no body bends"
+        raise study.source.fault("frame", what, expected="a joint that nothing drives, or a body with modes")
     loads, links = tuple(loads_of(study, bodies)), tuple(springs_of(study, bodies))
     motions += dict.fromkeys(load.course for load in loads if load.course)
     found = FloatingModel(study, bodies, tuple(joints), first, places, springs, tuple(motions), size, loads, links)

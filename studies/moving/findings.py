@@ -16,7 +16,7 @@ from studies.findings.residual import settling_of, told_settling, until_settled
 from studies.moving.question import Question
 from studies.protocol.study import question_of
 from studies.results.findings_common import in_words, over_all, told_statuses, uncertainty, while_held
-from studies.results.formatting import counted, quantity
+from studies.results.formatting import ROUNDING, counted, quantity
 from studies.results.places import extreme
 from studies.results.results import Results
 
@@ -186,7 +186,8 @@ def _ends(results: Results) -> Iterator[str]:
         spans = (results.dataset["end_max"] - results.dataset["end_min"]).sel(frame=name)
         if not np.isfinite(spans.values).any():
             continue
-        widest = [quantity(float(np.nanmax(spans.sel(component=axis))), "m") for axis in ("x", "y", "z")]
+        wide = [float(np.nanmax(spans.sel(component=axis))) for axis in ("x", "y", "z")]
+        widest = [quantity(one if one > ROUNDING * max(wide) else 0.0, "m") for one in wide]
         yield f"The far end of {name} moves over {widest[0]}, {widest[1]} and {widest[2]} along x, y and z."
 
 

@@ -40,3 +40,12 @@ def test_errors_of_fixed_modes_are_told_by_twice_as_many_or_not_at_all(modes: in
     assert found.status == status
     assert np.isnan(told).all() if status == Status.UNRESOLVED else (told < 0.05).all()
     assert float(found.bend_min) == pytest.approx(LEAST, rel=0.02)
+
+
+def test_where_an_end_hardly_moves_rounding_is_told_as_nothing() -> None:
+    """It was told as 3.74e-7 nm."""
+    found = studies.run(let_go(modes=2))
+    ends = found["end_max"].sel(frame="arm")
+    ends.loc[{"component": "y"}] = found["end_min"].sel(frame="arm", component="y") + 3.7e-16
+    (said,) = (text for text in studies.answer(found) if text.startswith("The far end of arm moves over"))
+    assert ", 0 m and " in said and "nm" not in said
