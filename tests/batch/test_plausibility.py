@@ -129,6 +129,9 @@ CASES = {
         {"car": mass(0.1, WAY), "absorber": oscillator(0.1, 2.0, {"kind": "standing", "at": 0.5})},
         sensor={"middle": fixed(0.5)},
     ),
+    "body.bar.mass = 0.0001 kg: its radius of gyration is more than five times its length, expected at least": (
+        on_wheels().with_values({"body.bar.mass": 1e-4})
+    ),
     "the force of carriage car is negative, so that it lifts: weights are positive": passing(car=force(-0.1, WAY)),
     "carriage car pulls for a part of each swing, as its amplitude, 2 N, is above its force": passing(
         car=force(1.0, WAY, pulsation={"amplitude": 2.0, "frequency": 1.0})

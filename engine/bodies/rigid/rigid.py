@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,11 +16,13 @@ from pydantic import Field
 from engine.bodies.modal.description import Body
 from engine.bodies.modal.modal_body import Array, ModalBody
 from engine.bodies.modal.outline import ALONG, DOWN, Line, Lump, Outline, straight
+from engine.bodies.modal.section_doubts import Doubt
 from engine.study_file.checks import Check, on_body
-from engine.study_file.units import Inertia, Length, Mass
+from engine.study_file.units import Inertia, Length, Mass, unit_of
 from results_schema.errors import BadInput
 from results_schema.quantities import OF_SECTION
 
+WIDE = 5.0  # lengths: a radius of gyration of what is short beside its track, as a tool at a flange
 BOX = 0.1  # height over length, as it is drawn
 
 
@@ -73,6 +75,12 @@ class Rigid(Body):
         centre = Lump("centre of mass", self.centre_of_mass * ALONG, self.mass)
         return replace(found, lines=(box,), masses=(centre,))
 
+    def doubts(self, here: str) -> list[Doubt]:
+        keys = tuple(f"{here}.{key}" for key in ("mass", "inertia", "length"))
+        what = "its radius of gyration is more than five times its length"
+        expected, unit = "at least inertia/(5 length)^2, in kg", unit_of(Mass)
+        return [Doubt(keys[0], keys, _fills_its_length, what, expected, unit, ("t",))]
+
     def checks(self, here: str) -> list[Check]:
         if self.centre is None:
             return []
@@ -105,6 +113,11 @@ class RigidStatics:
     def own_weight_deflection(self, x: ArrayLike, derivative: int) -> Array:
         """Raises BadInput: no static state carries a free body."""
         raise BadInput("own weight of a rigid body that nothing holds", where="own_weight", expected="false")
+
+
+def _fills_its_length(mass: Any, inertia: Any, length: Any) -> Any:
+    """Whether its mass lies no farther out than its track is long, about; one without mass has nothing there."""
+    return (inertia <= mass * (WIDE * length) ** 2) | (mass == 0.0)
 
 
 def rigid_body(body: Rigid) -> ModalBody:
