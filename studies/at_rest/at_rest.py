@@ -5,7 +5,7 @@ starts. Nothing is marched; a kind says what it computes of a scene, and this cu
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -28,6 +28,8 @@ from studies.at_rest.labelling import Gathering, asked_coordinates
 from studies.at_rest.positions import CORRECTED, Asked, Positions, check_mode_counts, positions_of, with_modes
 from studies.protocol.parts import Piece, Work, unlabelled
 from studies.protocol.study import PiecedKind, question_of
+from studies.results.findings_common import first_carriage
+from studies.results.formatting import listed
 
 Named = Mapping[str, NDArray[Any]]
 
@@ -76,6 +78,18 @@ class AtRestKind(PiecedKind):
         asked = question_of(study, self.settings)
         positions_of(study, asked)
         check_mode_counts(study, asked)
+
+    def remarks(self, study: Study) -> Sequence[str]:
+        name, _ = first_carriage(study)
+        train, stays = study.axles.get(name), list[str]()
+        for other, carriage in study.carriage.items():
+            low, high = carriage.motion.range()
+            if other != name and low < high and (train is None or study.axles.get(other) != train):
+                stays.append(other)
+        if not stays:
+            return ()
+        alone = f"the first carriage alone, {name}, " if train is None else f"the first train alone, that of {name}, "
+        return (f"{alone}is put from place to place; {listed(stays)} {'stay' if stays[1:] else 'stays'} at the start",)
 
     def coordinates(self, study: Study) -> Mapping[str, NDArray[Any]]:
         asked = question_of(study, self.settings)

@@ -88,7 +88,7 @@ class Eigenfrequencies(AtRestKind):
 
     def remarks(self, study: Study) -> tuple[str, ...]:
         said = told_of(base_scene(study))
-        return (said,) if said else ()
+        return (*super().remarks(study), *([said] if said else []))
 
     def variants(self, model: SceneModel, values: VariantValues, along: Along) -> dict[str, NDArray[Any]]:
         return {"frequency": coupled_frequencies(model, values, along, _count(model.study)) / (2.0 * np.pi)}
