@@ -138,7 +138,7 @@ def every(results: Results) -> str:
     """All of which a result can be told to be the same, in words: of what has no values nothing is known."""
     lost = sum(count for status, count in results.status_counts.items() if not status.values_kept)
     known, own = results.variants - lost, noun(results.dataset)
-    if not lost:
+    if not lost or not known:
         return f"every {own}"
     return f"all {counted(known, own)} with values" if known > 1 else f"the one {own} with values"
 

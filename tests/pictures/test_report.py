@@ -214,3 +214,5 @@ def test_what_is_the_same_is_so_in_the_variants_that_have_values(lost: int, word
     assert f"in {words}" in page.replace("\N{NO-BREAK SPACE}", " ")
     dataset["status"].values[:3] = Status.DIVERGED
     assert every(Results.of(dataset)) == "the one variant with values"
+    dataset["status"].values[:] = Status.DIVERGED
+    assert every(Results.of(dataset)) == "every variant"
