@@ -87,7 +87,7 @@ class Choice(NamedTuple):
 
 def of_what_stands(results: Results) -> list[Axis]:
     """The swept numbers of carriages that stand, as absorbers do."""
-    ranges = {name: one.motion.range() for name, one in results.study.carriage.items()}
+    ranges = {name: one.motion.range() for name, one in results.study.carriage.items() if not one.motion.slides}
     stands = tuple(f"carriage.{name}." for name, (low, high) in ranges.items() if low == high)
     return [axis for axis in results.axes if all(path.startswith(stands) for path in axis.paths)]
 
