@@ -34,6 +34,7 @@ def swept(count: int, **axes: Table) -> Study:
     )
 
 
+@pytest.mark.slow
 def test_many_scenes_of_one_variant_are_chosen_for_by_a_few() -> None:
     """None of the variants is beyond its tolerance, few of their errors are told too small, and they take far less than
     the pilots' references."""
@@ -73,6 +74,7 @@ def test_variants_that_differ_in_their_tolerance_are_one_pilot() -> None:
     assert drawn.size == np.unique(coordinates(of_one_scene.cases, drawn), axis=0).shape[0] == 100
 
 
+@pytest.mark.slow
 def test_scenes_of_which_some_may_not_be_marched_swiftly_share_a_ladder() -> None:
     """The mass on its spring swings freely after the bed: softly beside the modes of a short bed alone."""
     sprung = oscillator(0.3, 30.0, cruise(0.0, 1.0, 1.0, after=2.0), wheel_mass=0.05)

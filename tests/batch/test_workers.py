@@ -104,6 +104,7 @@ NAPS = [Job(nap, np.array([number])) for number in range(40)]
 
 
 @pytest.mark.fault(31)
+@pytest.mark.slow
 def test_what_a_killed_worker_had_is_done_again(workers: Workers) -> None:
     """Of two, one dies twice, after 2 s, while jobs of 12 s are done, and once others have done some since, as workers
     may take longer to start; what is found later has the same bits."""

@@ -109,7 +109,11 @@ def test_a_part_that_was_damaged_meanwhile_is_computed_again(monkeypatch: pytest
 
 
 @pytest.mark.fault(25, 48)
-@pytest.mark.parametrize(("signals", "code"), [([signal.SIGTERM], 143), ([signal.SIGINT] * 2, 130)], ids=str)
+@pytest.mark.parametrize(
+    ("signals", "code"),
+    [pytest.param([signal.SIGTERM], 143, marks=pytest.mark.slow), ([signal.SIGINT] * 2, 130)],
+    ids=str,
+)
 def test_a_long_run_ends_in_time(here: Path, signals: list[signal.Signals], code: int) -> None:
     write(here, LONG, "long.toml")
     process = start(here, "run", "long.toml")

@@ -71,6 +71,7 @@ def test_what_is_linearised_differs_in_second_order() -> None:
     assert found[-1] < 1e-6
 
 
+@pytest.mark.slow
 def test_the_model_is_measured() -> None:
     """Pilots of the scene choose: the same arm within 1e-3 by frames that are given, which the told error covers, and
     within 1e-9 by the floating frame; so where that is asked for, or a joint moves by itself."""

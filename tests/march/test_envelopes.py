@@ -180,6 +180,7 @@ def mixed() -> Study:
 
 
 @pytest.mark.fault(20)
+@pytest.mark.slow
 def test_same_bits_for_any_chunks_and_threads() -> None:
     given = mixed()
     whole = digest(make_plan(given), None, 2)

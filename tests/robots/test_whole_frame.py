@@ -2,6 +2,7 @@
 follow their plan, their places linear in the motion of the rail, and all matrices made anew at every step."""
 
 import numpy as np
+import pytest
 from scipy.linalg import eigh
 
 from engine.bodies.frame.assembly import assemble
@@ -97,6 +98,7 @@ class Whole:
         return np.array(found), np.array(rest)
 
 
+@pytest.mark.slow
 def test_five_seconds_on_the_whole_frame() -> None:
     """Within 1 % of the largest error of the tool, and within 2 % of what is left of it without that at rest."""
     whole, rest = Whole(study()).march()
