@@ -63,7 +63,8 @@ declare(
         steps_used | | | int32 | number of steps used
             steps over one passage or cycle
         scheme_used | | - | optional int8 | time integration scheme used
-            where it is left open Fox-Goodwin's, with more mass of fast modes, or average acceleration
+            where it is left open Fox-Goodwin's, with more mass of fast modes, average acceleration, or HHT-alpha with
+            -0.05
         diverged_step | | | optional int64 | first step at which the variant had diverged
             counted from the start; -1 where it did not diverge
         work | | | optional | work of the variant
