@@ -48,7 +48,10 @@ KEPT_CYCLE = 256 * 2**20  # of a cycle's tables: ten of 64 modes x 102,400 steps
 #: Steps per first period, up to which sweeps of a sprung mass on stiff springs took a third of the work that average
 #: acceleration took; at ten times as many 9 of 192 references have no estimate.
 CLOSE_STEPS = 20_000
-SLOWLY, ON_IT = 8, 1e-9  # steps of a contact's period in one of the grid's; m or alike: a rider so near is on its body
+#: Periods of contacts in a step of the grid, from which on a scheme that damps is taken: `machine-bed-run`, just
+#: beyond, takes a quarter of the steps by it.
+SLOWLY = 8
+BEGINNING = 1e-9  # of scene time: what a rider is on then it is on at the start
 LEAST_FREE = 8  # steps per first period of free vibration: what the coarsest march of such passages had
 
 
@@ -211,7 +214,7 @@ def open_scheme(grid: SceneGrid) -> Scheme:
         return SCALED_FOX_GOODWIN
     fewest = grid.mode_levels[0] if open_bodies(grid.scene.study) else 0
     model = grid.model(grid.scene.numerics._replace(scheme=SCALED_FOX_GOODWIN, modes=fewest))
-    dropped = grid.scene.study.start == "rest" and any(rider.touches(0.0, ON_IT) for rider in model.riders)
+    dropped = grid.scene.study.start == "rest" and any(rider.touches(0.0, BEGINNING) for rider in model.riders)
     if not dropped and np.any(contact_steps(model, grid.values) > SLOWLY * unit_steps(grid.scene)):
         return DAMPED
     if any(vibrates_freely(carriage) for carriage in model.carriages) and not are_soft(model, grid.values):

@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 
 
 SOFT = 0.25  # of the highest frequency of the bodies' modes: springs raise it by 3 % at most, within LIMIT_MARGIN
-#: omega_c h up to which schemes that damp so do not grow: 64 undamped scenes on springs, marched by HHT-alpha -0.05
-#: with omega_c h of 16 to 6,000, had the largest forces of fine marches within 0.9 %.
-DAMPED_TURN = 2000.0
+#: Of a contact on its spring, in a step: 64 undamped scenes, marched by HHT-alpha -0.05 with omega_c h of 16 to 6,000,
+#: had the largest forces of fine marches within 0.9 %.
+MOST_PERIODS = 300
 FREE_STEPS = 200  # per first period of free vibration where the study fixes the steps: 8e-5 of phase a period
 LIMIT_MARGIN = 1.05  # a conditionally stable scheme stays this far inside its limit, which a mass on it lowers a little
 # Steps must be so many times the alias rule's. Right above the rule average acceleration still grows by up to 1.23 per
@@ -232,7 +232,7 @@ def contact_omega(model: SceneModel, values: VariantValues) -> Array:
 def contact_steps(model: SceneModel, values: VariantValues) -> Array:
     """(V,) steps none of which is longer than a period of a contact on its spring, or than so much of it that a scheme
     that damps still does not grow."""
-    turn = DAMPED_TURN if damps_contacts(model.scheme) else 2.0 * math.pi
+    turn = 2.0 * math.pi * (MOST_PERIODS if damps_contacts(model.scheme) else 1)
     return np.asarray(model.scheme.stride * contact_omega(model, values) * values.scene_time_scale / turn)
 
 
@@ -265,8 +265,8 @@ def check_steps(model: SceneModel, values: VariantValues, steps: Counts) -> None
     check_free_vibration(model, values)
     least = limit_with_springs(model, values) / LIMIT_MARGIN
     _refuse(model, least, steps, "the step is beyond the scheme's stability limit")
-    turn = "300 periods" if damps_contacts(model.scheme) else "a period"
-    what = f"a step is longer than {turn} of the contact on its spring: the march could grow"
+    most = f"{MOST_PERIODS} periods" if damps_contacts(model.scheme) else "a period"
+    what = f"a step is longer than {most} of the contact on its spring: the march could grow"
     _refuse(model, contact_steps(model, values), steps, what)
 
 

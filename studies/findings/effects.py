@@ -85,9 +85,10 @@ class Choice(NamedTuple):
     end: str
 
 
-def of_what_stands(results: Results) -> list[Axis]:
-    """The swept numbers of carriages that stand, as absorbers do."""
-    ranges = {name: one.motion.range() for name, one in results.study.carriage.items() if not one.motion.slides}
+def of_absorbers(results: Results) -> list[Axis]:
+    """The swept numbers of what stands on a spring."""
+    sprung = {name: one.motion for name, one in results.study.carriage.items() if one.suspension is not None}
+    ranges = {name: motion.range() for name, motion in sprung.items() if not motion.slides}
     stands = tuple(f"carriage.{name}." for name, (low, high) in ranges.items() if low == high)
     return [axis for axis in results.axes if all(path.startswith(stands) for path in axis.paths)]
 
@@ -98,11 +99,7 @@ def best_choice(results: Results, values: Array, free: Sequence[Axis]) -> Choice
     varied = [axis for axis in results.axes if axis.values.size > 1]
     free = [axis for axis in varied if axis in free]
     sampled = VARIANT in results.dims
-    if (
-        not free
-        or (sampled and free != varied)
-        or prod(dict((axis.dim, axis.values.size) for axis in free).values()) <= 2
-    ):
+    if not free or (sampled and free != varied) or prod({axis.dim: axis.values.size for axis in free}.values()) <= 2:
         return None
     own = {results.dims.index(axis.dim) for axis in free}
     others = tuple(n for n in range(values.ndim) if n not in own)

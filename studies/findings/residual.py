@@ -14,7 +14,7 @@ from results_schema.arrays import Array, Mask
 from studies.findings.absolute_errors import absolute_errors, told_error
 from studies.findings.amplification import only_rounding, sizes
 from studies.findings.beyond import LIMITED, AskedOfRest, Limits, in_turns, out_of_reach, where_beyond
-from studies.findings.effects import best_choice, by_effect, of_what_stands, told_both_ways, told_effects
+from studies.findings.effects import best_choice, by_effect, of_absorbers, told_both_ways, told_effects
 from studies.results.axes import DIRECTION, VARIANT, Axis
 from studies.results.findings_common import in_words, while_held
 from studies.results.formatting import ROUNDING, counted, listed, once, quantity
@@ -206,7 +206,7 @@ def _residual(results: Results, sensor: str, asked: AskedOfRest) -> str:
 def _told_least(results: Results, values: Array, units: str) -> str:
     """At which motions, delays or absorbers it swings least, behind where most; "" where `best_choice` finds none."""
     free = [axis for axis in results.axes if axis.sets_motion and not axis.sets(DIRECTION)]
-    found = best_choice(results, values, [*free, *of_what_stands(results)])
+    found = best_choice(results, values, [*free, *of_absorbers(results)])
     return f", and least, by up to {quantity(found.value, units)}{found.end}, at {found.where}" if found else ""
 
 

@@ -37,7 +37,7 @@ from studies.findings.effects import (
     best_choice,
     by_effect,
     hardly_changed,
-    of_what_stands,
+    of_absorbers,
     told_both_ways,
     told_effects,
     unchanged,
@@ -182,7 +182,6 @@ def _largest(results: Results, sensor: str) -> str:
 def _effects(results: Results, envelopes: list[str], sensors: list[str]) -> str:
     """What every swept number does to what the answer begins with, where there are several; "" else."""
     error: Array | float = 0.0
-    best = ""
     if envelopes:
         name = envelopes[0]
         what, values = (
@@ -195,11 +194,11 @@ def _effects(results: Results, envelopes: list[str], sensors: list[str]) -> str:
         error, units = errors_of_size(results, sensors[0]), results.sensors[sensors[0]]
         if hardly_changed(results, values, partial(quantity, units=units)):
             return told_both_ways(results, values, f"the largest {what}", units, error)
-    if chosen := best_choice(results, values, of_what_stands(results)):
-        best = f" The largest {what} is least, {quantity(chosen.value, units)}{chosen.end}, at {chosen.where}."
+    best = best_choice(results, values, of_absorbers(results))
+    least = f" The largest {what} is least, {quantity(best.value, units)}{best.end}, at {best.where}." if best else ""
     said = told_effects(results, values, f"the largest {what}", error)
     ways = told_both_ways(results, values, f"the largest {what}", units, error)
-    return f"{best} {said}{ways}" if said else f"{best}{ways}"
+    return f"{least} {said}{ways}" if said else f"{least}{ways}"
 
 
 def _in_step(results: Results, envelopes: list[str], sensors: list[str]) -> str:
