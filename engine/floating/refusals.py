@@ -161,7 +161,7 @@ def _check_held(model: FloatingModel) -> None:
         )
         if pinned and not any(joint.turns_freely for joint in joints):
             what = "it turns about its pin, and no joint lets it turn without a motion, a spring or a damper"
-            raise fault(here, what, expected="clamped at its beginning, or such a joint")
+            raise fault(here, what, expected="clamped at its beginning, or a joint that turns freely")
 
 
 def _check_rolling(model: FloatingModel) -> None:

@@ -57,10 +57,15 @@ def told_low_contacts(results: Results, least: float | None) -> list[str]:
     others = [name for name in parts if name != lowest and below[name].any()]
     also = f" So {'do those' if len(others) > 1 else 'does that'} of {listed(others[:MOST_TOLD])}" if others else ""
     also += f" and {len(others) - MOST_TOLD} more." if len(others) > MOST_TOLD else "." * bool(also)
-    of = "an equal share of its weight" if len(results.study.carriage[lowest].riding_contacts) > 1 else "its weight"
-    said = f"falls below {number(least)} of {of} {where(results, below[lowest], results.axis(*PACES))}"
+    at = where(results, below[lowest], results.axis(*PACES))
+    said = f"falls below {number(least)} of {_share(results, lowest)}its weight {at}"
     smallest = f"at its smallest it is {number(float(parts[lowest][place]))} of it{in_words(results, place)}"
     return [f"The contact force of {lowest} {said}; {smallest}{ASIDE if _is_read(results) else ''}.{also}"]
+
+
+def _share(results: Results, carriage: str) -> str:
+    """Words before the weight where each of several contacts is compared with its part of it; "" else."""
+    return "an equal share of " if len(results.study.carriage[carriage].riding_contacts) > 1 else ""
 
 
 def _part_of_weight(results: Results, carriage: str) -> Array:
@@ -170,12 +175,15 @@ def _lifted(results: Results, opened: dict[str, tuple[Mask, Mask]]) -> str:
 
 
 def _keeps_pace(study: Study, carriage: str) -> bool:
-    """Whether a body on contacts moves as a carriage does, behind it or ahead, as a coach with its wheels."""
+    """Whether a body on contacts moves as a carriage without any does, behind it or ahead, as a coach with its
+    wheels."""
     own = study.carriage[carriage]
+    if own.riding_contacts:
+        return False
     motion, ends = own.motion.model_dump(), {"start", "end"}
-    for name, other in study.carriage.items():
+    for other in study.carriage.values():
         theirs = other.motion.model_dump()
-        if name != carriage and other.riding_contacts and own.on in other.ridden and motion.keys() == theirs.keys():
+        if other.riding_contacts and own.on in other.ridden and motion.keys() == theirs.keys():
             apart = {round(motion[key] - theirs[key], 6) for key in ends & motion.keys()}
             if len(apart) <= 1 and all(motion[key] == theirs[key] for key in motion.keys() - ends - {"after"}):
                 return True
@@ -216,7 +224,8 @@ def _nearest_to_lifting(results: Results, carriage: str, place: Index) -> str:
     least = extreme(-part)
     if least is None or float(part[least]) >= (1.0 - ALIKE) * float(part[place]):
         return ""
-    return f"; over the weight it is smallest{in_words(results, least)}: {number(float(part[least]))}"
+    over = f"; over {_share(results, carriage)}the weight"
+    return f"{over} it is smallest{in_words(results, least)}: {number(float(part[least]))}"
 
 
 def _doubtful(results: Results, carriage: str, force: Array, off: float) -> str:

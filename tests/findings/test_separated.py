@@ -99,17 +99,25 @@ contacts.rear = { at = 0.5, stiffness = 1e5, damping = 1e3 }
 motion = { kind = "cruise", start = -1.5, end = 11.5, speed = 1.0 }
 """
 
+BEHIND = COACH.replace("coach", "behind").replace("-1.5", "-7.5").replace("11.5", "5.5")
+
 
 def test_what_presses_a_wheel_down_besides_itself_is_told_and_each_contact_has_its_share() -> None:
     """Wheels of a coach "would lift off" without a word of it; at rest neither contact bore half of its weight."""
-    text = scenes.text_of("passage", scenes.pace("passage"), extra=f"{COACH}\n[question]\nleast_contact = 0.5")
+    text = scenes.text_of("passage", scenes.pace("passage"), extra=f"{COACH}{BEHIND}\n[question]\nleast_contact = 0.5")
     for start, told in ((0.0, True), (0.1, False)):
         study = engine.load(text).with_values({"carriage.table.motion": WHEEL | {"start": start}})
         found = studies.run(study.without_sweep())
-        found["table_contact_force_min"].values[...] = -1.0
+        found["table_contact_force_min"].values[...], found["behind_contact_force_min"].values[...] = -1.0, 1e6
         found["coach_contact_force_min"].values[...] = 0.8 * 0.5 * 300.0 * study.gravity
         ((said,), _) = told_contacts(Results.of(found))
         assert said.startswith("table would lift off") and ("as its wheels do (table)" in said) == told
+        for name in ("coach", "behind"):  # which keep pace, and are no wheels
+            found[f"{name}_contact_force_min"].values[...] = -1.0
+        ((both,), _) = told_contacts(Results.of(found))
+        assert ("as its wheels do (table)" in both) == told and both.count("coach") == 1
+        found["coach_contact_force_min"].values[...] = 0.8 * 0.5 * 300.0 * study.gravity
+    found["behind_contact_force_min"].values[...] = 1e6
     found["table_contact_force_min"].values[...] = 1e6
     (low,) = (one for one in answers.answer(found) if one.startswith("The contact force of coach"))
     assert "below 0.5 of an equal share of its weight nowhere" in low and "at its smallest it is 0.8 of it" in low
