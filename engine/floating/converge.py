@@ -119,13 +119,13 @@ def converge(
         now = level.march(own, duration[active], rung.fidelity)
         if found is None:
             found, results, scheme = now, results_of(model), level.scheme
-            error = np.full((len(results), V), np.nan)
+            error, least = np.full((len(results), V), np.nan), np.array([[result.left] for result in results])
             change, held = error.copy(), np.full(V, np.nan)
             modes, steps, coarsest = np.full(V, model.modes), np.full(V, level.steps), level.steps
             continue
         apart = differences(model, found.of(active), now)
         unlike = np.isnan(change[:, active]).all(axis=0) & (apart > UNLIKE).any(axis=0)
-        by_steps = np.maximum(left_over(apart, change[:, active]), now.sooner)
+        by_steps = np.maximum(left_over(apart, change[:, active], least), now.sooner)
         told = by_steps + rung.left_out[:, None]
         error[:, active], change[:, active] = told + rung.by_fixed.told(own.columns, own.size), apart
         modes[active], steps[active] = model.modes, level.steps

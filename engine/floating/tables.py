@@ -232,7 +232,7 @@ def _readings(model: FloatingModel) -> tuple[Array, Counts]:
 def _smooth(model: FloatingModel) -> Counts:
     """(K, 2) signals that go on as smoothly as coordinates do: what sensors read of these, also after stops, but for
     shear forces, which jump as a carriage passes; and places along tracks of what slides by itself: given motions may
-    stop at an instant, over which a parabola would pass; and whether it is their squares that do, as of lengths."""
+    stop at an instant, over which a parabola would pass; and the tips whose lengths they are, else -1."""
     read, ridden = model.study.sensor.values(), {carriage.on for carriage in model.study.carriage.values()}
     jumps = [sensor.reads.derivative == SHEAR and sensor.body in ridden for sensor in read]
     rough = [sensor.reads.rate or sensor.reads.of_drive or jump for sensor, jump in zip(read, jumps, strict=True)]
@@ -240,10 +240,10 @@ def _smooth(model: FloatingModel) -> Counts:
     first = model.signal_of("carriages")
     places = [first + OF_CARRIAGE * c for c, name in enumerate(model.study.carriage) if name in model.places]
     stops = [model.signal_of("stops") + t for t in range(len(model.tips))]
-    lengths = [sensor.reads.of_arm and sensor.direction is None for sensor in read]
-    at_stops = [sensor.direction is None for sensor in model.tips.values()]
-    squared = [*(lengths[n] for n in sensors), *(False for _ in places), *at_stops]
-    return np.array([[*sensors, *places, *stops], squared], dtype=np.int64).T.copy()
+    tips = {name: t for t, (name, sensor) in enumerate(model.tips.items()) if sensor.direction is None}
+    names, none = list(model.study.sensor), [-1] * len(places)
+    lengths = [*(tips.get(names[n], -1) for n in sensors), *none, *(tips.get(name, -1) for name in model.tips)]
+    return np.array([[*sensors, *places, *stops], lengths], dtype=np.int64).T.copy()
 
 
 def _depths(model: FloatingModel) -> Array:

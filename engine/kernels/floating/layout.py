@@ -51,8 +51,8 @@ MISSED_READING, MISSED_BODY = 0, 1
 MISSED_PLACE, MISSED_UNIFORM, MISSED_TURNING, MISSED_SPUN, MISSED = 0, 1, 2, 3, 4
 # columns of System.shortening
 SHORTER, AXIS, ONE, OTHER = 0, 1, 2, 3
-# columns of System.smooth: the signal, and whether it is its square that is smooth
-SIGNAL, SQUARED = 0, 1
+# columns of System.smooth: the signal, and the tip whose vector's length it is, else -1
+SIGNAL, TIP = 0, 1
 # columns of System.tips: the sensor, and the body; of System.tip_places: the undeformed place in the frame, the
 # direction over the ground in which it is read, zero where the length is, and displacements by the modes, one after the
 # other
@@ -80,7 +80,7 @@ class System(NamedTuple):
     missed (K, MISSED): readings of section forces, and what their modes miss; missed_lines (K, 2, cells, 4): that by a
     unit force across the track, in equal cells before and beyond the place; missed_grips (K, P): that at grips, times
     weight, and missed_twists (K, P) that by a unit torque about y. smooth (K, 2): signals that have extremes between
-    stations.
+    stations, and the tips whose lengths they are, or -1.
     tips (T, 2), tip_places (T, 6 + 3 n): places whose distance from the rigid arm is read; tip_shorter (T, A, n, n): G
     there; carrying (L): the bodies of these arms, each after its parent. bands (T, K), m: of each tip, within which it
     is told when what is left after a stop stays; none where no study asks.

@@ -26,12 +26,10 @@ from engine.kernels.floating.layout import (
     Coordinates,
     Lane,
 )
-from engine.kernels.floating.motions import motions_at
+from engine.kernels.floating.motions import copy, motions_at
 from engine.kernels.floating.newton import bound_masses, factor_masses, raise_beta, settle, solve_accelerations, step
 from engine.kernels.floating.observe import (
     apart,
-    at_stop,
-    compare,
     count,
     count_between,
     observe,
@@ -73,24 +71,18 @@ OFF = 1e-9  # of a length: less over an end of a track is rounding of a given mo
 
 
 class Room(NamedTuple):
-    """What the march of a block of lanes works in; signals (signals, LANES), past (2, K, LANES): those that are smooth,
-    at the two stations before, left (T, LEFT, LANES): where tips come to rest, and how far from there they were
-    after a stop at the last station, and errors (T, LANES): of their positions at the last station."""
+    """What the march of a block of lanes works in; signals (signals, LANES) where they were observed last, at_event
+    (signals, LANES) on one side of an event, past (2, K, LANES): those that are smooth, at the two stations before,
+    tips_before (2 T, 3, LANES): how far tips were from where the rigid arm has them there, and left (T, LEFT, LANES):
+    where tips come to rest, and how far from there they were after a stop at the last station."""
 
     state: State
     solver: Solver
     signals: FloatArray
+    at_event: FloatArray
     past: FloatArray
+    tips_before: FloatArray
     left: FloatArray
-    errors: FloatArray
-
-
-@called
-def copy(one, other):
-    """Motions (M, 3, LANES) into others."""
-    for m in range(one.shape[0]):
-        for k in range(3):
-            put_lanes(other, (m, k), lanes_at(one, (m, k)))
 
 
 @called
@@ -182,8 +174,27 @@ def next_events(events, who, memory):
 
 
 @called
-def go_through(system, lane, scheme, number, state, solver):
-    """All lanes through a step, over the events that come before its end."""
+def observe_events(system, lane, who, begun, end, room, statistics):
+    """Some lanes over an event between two times (s), which they have come to, with what is observed on both sides of
+    it in the statistics (signals, STATISTICS, LANES). Squares are integrated by trapezoids; that of the step was to
+    reach from the station before to its end."""
+    state, solver, signals, at_event = room.state, room.solver, room.signals, room.at_event
+    time, h, near = of(solver.memory, TIME), lanes_at(lane.step, (0,)), near_of(lane)
+    at, before, behind = time / h, 0.5 * (time - begun) / h, 0.5 * (end - time) / h
+    watched = observe(system, lane, state.now, solver.work, time + near, at_event)
+    count(who, signals, watched, at, -1.0 * behind, statistics)
+    count(who & (time > begun + near), at_event, watched, at, before, statistics)
+    pass_events(system, lane, who, end, state, solver)
+    observe(system, lane, state.now, solver.work, time + near, at_event)
+    count(who, at_event, watched, at, behind, statistics)
+    for j in range(watched):
+        put_where(who, signals, (j,), lanes_at(at_event, (j,)))
+
+
+@called
+def go_through(system, lane, scheme, number, room, statistics):
+    """All lanes through a step, over the events that come before its end; the part of it that is behind these."""
+    state, solver = room.state, room.solver
     memory, h, near = solver.memory, lanes_at(lane.step, (0,)), near_of(lane)
     start, end = (number - 1.0) * h, float(number) * h
     if number % (KEPT * (lane.start.shape[1] + 1)) == 0:
@@ -193,12 +204,15 @@ def go_through(system, lane, scheme, number, state, solver):
         who = event < end - near
         apart = who & (event > of(memory, TIME) + near)
         put_where(apart, memory, (FRESH,), all_lanes(0.0))  # of another step
+        begun = of(memory, TIME)
         go_on(system, lane, scheme, apart, event, state, solver)
-        pass_events(system, lane, who & sound(memory), end, state, solver)
+        observe_events(system, lane, who & sound(memory), begun, end, room, statistics)
         next_events(lane.events, who, memory)
-    shorter = of(memory, TIME) > start + near
+    begun = of(memory, TIME)
+    shorter = begun > start + near
     go_on(system, lane, scheme, h > 0.0, end, state, solver)
     put_where(shorter, memory, (FRESH,), all_lanes(0.0))
+    return choose(shorter, (end - begun) / h, 1.0)
 
 
 @copied
@@ -209,10 +223,12 @@ def room_to_march(system, lane, record):
     now, tried = Coordinates(rows[0], rows[1], rows[2]), Coordinates(rows[3], rows[4], rows[5])
     state = State(now, tried, rows[6], rows[7], rows[8], rows[9], rows[10], rows[11])
     two, both = np.zeros((2, N, N, LANES)), np.zeros((2, M, 3, LANES))
-    memory, signals = np.zeros((MEMORY, LANES)), np.zeros((record.statistics.shape[1], LANES))
+    memory, signals = np.zeros((MEMORY, LANES)), np.zeros((2, record.statistics.shape[1], LANES))
     solver = Solver(room(system, lane), np.zeros((N, LANES)), two[0], two[1], both[0], both[1], memory)
     past, tips = np.zeros((2, system.smooth.shape[0], LANES)), system.tips.shape[0]
-    return Room(state, solver, signals, past, np.zeros((tips, LEFT, LANES)), np.zeros((tips, LANES)))
+    return Room(
+        state, solver, signals[0], signals[1], past, np.zeros((2 * tips, 3, LANES)), np.zeros((tips, LEFT, LANES))
+    )
 
 
 @called
@@ -291,22 +307,20 @@ def with_light_carriages(lane):
 @called
 def march_block(system, lane, scheme, steps, block, room, record):
     """One block of lanes from the start to the end, its signals and codes into the record."""
-    state, solver, signals, past, left, errors = room
-    work, memory, kept = solver.work, solver.memory, 0
+    state, solver, signals, left = room.state, room.solver, room.signals, room.left
+    work, memory, statistics, kept, behind = solver.work, solver.memory, record.statistics[block], 0, all_lanes(0.0)
     start(system, lane, scheme, steps * lanes_at(lane.step, (0,)), state, solver, left)
     for number in range(steps + 1):
         if number:
-            go_through(system, lane, scheme, number, state, solver)
+            behind = go_through(system, lane, scheme, number, room, statistics)
         goes = sound(memory)
         if record.stop[0] != 0 or everywhere(of(memory, CODE) > SOUND + 0.5):
             break
         note_last(memory, number, block, record.last)
         watched = observe(system, lane, state.now, work, of(memory, TIME) + near_of(lane), signals)
-        count(goes, signals, watched, number, 0.5 if number in (0, steps) else 1.0, record.statistics, block)
-        count_between(goes, system.smooth, signals, past, number, record.statistics, block)
-        for t in range(errors.shape[0]):
-            stops, value, at = at_stop(system, lane, signals, errors, number, t)
-            compare(goes & stops, value, at, watched - errors.shape[0] + t, record.statistics, block)
+        weight = 0.5 * behind + (0.5 if number < steps else 0.0)
+        count(goes, signals, watched, all_lanes(float(number)), weight, statistics)
+        count_between(system, goes, room, number, statistics)
         if system.bands.shape[1]:
             count_settling(system, lane, state.now, solver, left, number, record.settled[block])
         if kept < record.stations.size and record.stations[kept] == number:

@@ -37,6 +37,14 @@ def motions_at(pieces, t, within, piece, out):
 
 
 @called
+def copy(one, other):
+    """Motions (M, 3, LANES) into others."""
+    for m in range(one.shape[0]):
+        for k in range(3):
+            put_lanes(other, (m, k), lanes_at(one, (m, k)))
+
+
+@called
 def piece_at(pieces, m, j, time):
     """The last piece of a lane's motion that begins before a time, or the first."""
     first, last = 0, pieces.shape[1]

@@ -28,9 +28,9 @@ from engine.kernels.floating.layout import (
     SPRING,
     SPRUNG_COORDINATE,
     SPRUNG_MASS,
-    SQUARED,
     SQUARES,
     STIFFNESS,
+    TIP,
     TIP_BODY,
     TIP_PLACE,
     TIP_SENSOR,
@@ -56,6 +56,7 @@ from engine.kernels.floating.vectors import (
     axial,
     cross,
     dot,
+    keep_vector,
     matrix,
     no_vector,
     rotation,
@@ -88,6 +89,7 @@ from engine.kernels.vector import all_lanes, choose, lanes_at, put_lanes, root
 OF_CARRIAGE, OF_POINT, OF_BODY, OF_WHOLE = 8, 3, 18, 8
 BODY_VELOCITY, BODY_SPIN, BODY_ATTITUDE = 3, 6, 9  # of a body's
 CONTACT_FORCE = 6  # of a carriage's
+CLOSER = 3  # corrections of where a vector is least: a fourth changes nothing beyond rounding
 
 
 @called
@@ -155,8 +157,11 @@ def over_ground(frames, b, d):
 
 @called
 def position_error(system, t, x, work):
-    """How far a place is from where the rigid arm would have it: the length of that, or along a direction."""
-    return of_way(system, t, apart(system, t, x, work))
+    """How far a place is from where the rigid arm would have it, the length of that, or along a direction; the vector
+    into work.tips."""
+    a = apart(system, t, x, work)
+    keep_vector(work.tips, t, 0, a)
+    return of_way(system, t, a)
 
 
 @called
@@ -318,58 +323,71 @@ def of_mass(lane, b, mass, moving, work, out, first):
 
 
 @called
-def count(who, signals, watched, number, weight, statistics, block):
-    """The first signals of a station go into the statistics of some lanes."""
-    at = all_lanes(float(number))
+def count(who, signals, watched, at, weight, statistics):
+    """The first signals, so many steps from the start, go into the statistics of some lanes, by the steps that they
+    stand for."""
     for j in range(watched):
-        value = lanes_at(signals, (j,))
-        compare(who, value, at, j, statistics, block)
-        squares = lanes_at(statistics, (block, j, SQUARES))
-        put_where(who, statistics, (block, j, SQUARES), squares + weight * value * value)
+        value, squares = lanes_at(signals, (j,)), lanes_at(statistics, (j, SQUARES))
+        keep_larger(who, value, at, j, statistics)
+        keep_smaller(who, value, at, j, statistics)
+        put_where(who, statistics, (j, SQUARES), squares + weight * value * value)
 
 
 @called
-def compare(who, value, at, j, statistics, block):
-    """A value of a signal, so many steps from the start, with its extremes."""
-    larger = who & (value > lanes_at(statistics, (block, j, LARGEST)))
-    put_where(larger, statistics, (block, j, LARGEST), value)
-    put_where(larger, statistics, (block, j, LARGEST_AT), at)
-    smaller = who & (value < lanes_at(statistics, (block, j, SMALLEST)))
-    put_where(smaller, statistics, (block, j, SMALLEST), value)
-    put_where(smaller, statistics, (block, j, SMALLEST_AT), at)
+def keep_larger(who, value, at, j, statistics):
+    """A value of a signal beside its largest."""
+    larger = who & (value > lanes_at(statistics, (j, LARGEST)))
+    put_where(larger, statistics, (j, LARGEST), value)
+    put_where(larger, statistics, (j, LARGEST_AT), at)
 
 
 @called
-def at_stop(system, lane, signals, before, number, t):
-    """Whether a tip's motions ended since the last station, its position error then, by a line between stations,
-    and how many steps from the start; before (T, LANES): the errors of the last station."""
-    one, two = lanes_at(before, (t,)), lanes_at(signals, (system.tips[t, TIP_SENSOR],))
-    put_lanes(before, (t,), two)
-    part = lanes_at(lane.stops, (t,)) / lanes_at(lane.step, (0,)) - (number - 1.0)
-    return (part > 0.0) & (part < 1.0), one + part * (two - one), part + (number - 1.0)
+def keep_smaller(who, value, at, j, statistics):
+    """A value of a signal beside its smallest."""
+    smaller = who & (value < lanes_at(statistics, (j, SMALLEST)))
+    put_where(smaller, statistics, (j, SMALLEST), value)
+    put_where(smaller, statistics, (j, SMALLEST_AT), at)
 
 
 @called
-def count_between(who, smooth, signals, past, number, statistics, block):
+def count_between(system, who, room, number, statistics):
     """Extremes of smooth signals between stations: the vertices of parabolas through three, near the middle one; the
-    smallest of lengths by their squares, which are smooth where they pass near 0."""
+    smallest of lengths where a parabola of their vectors comes nearest to 0."""
+    smooth, signals, past, tips = system.smooth, room.signals, room.past, room.solver.work.tips
     for k in range(smooth.shape[0]):
-        j = smooth[k, SIGNAL]
+        j, t = smooth[k, SIGNAL], smooth[k, TIP]
         one, two, three = lanes_at(past, (0, k)), lanes_at(past, (1, k)), lanes_at(signals, (j,))
         put_lanes(past, (0, k), two)
         put_lanes(past, (1, k), three)
         if number < 2:
             continue
         turns, bend, value, at = vertex(one, two, three)
-        larger = who & turns & (bend < 0.0) & (value > lanes_at(statistics, (block, j, LARGEST)))
-        put_where(larger, statistics, (block, j, LARGEST), value)
-        put_where(larger, statistics, (block, j, LARGEST_AT), at + (number - 1.0))
-        if smooth[k, SQUARED]:
-            turns, bend, value, at = vertex(one * one, two * two, three * three)
-            value = root(choose(value > 0.0, value, 0.0))
-        smaller = who & turns & (bend > 0.0) & (value < lanes_at(statistics, (block, j, SMALLEST)))
-        put_where(smaller, statistics, (block, j, SMALLEST), value)
-        put_where(smaller, statistics, (block, j, SMALLEST_AT), at + (number - 1.0))
+        keep_larger(who & turns & (bend < 0.0), value, at + (number - 1.0), j, statistics)
+        if t >= 0:
+            turns, bend, value, at = nearest(one, two, three, room.tips_before, tips, t)
+        keep_smaller(who & turns & (bend > 0.0), value, at + (number - 1.0), j, statistics)
+    for t in range(tips.shape[0]):
+        keep_vector(room.tips_before, 2 * t, 0, vector(room.tips_before, 2 * t + 1, 0))
+        keep_vector(room.tips_before, 2 * t + 1, 0, vector(tips, t, 0))
+
+
+@called
+def nearest(one, two, three, before, now, t):
+    """Whether a parabola through the vectors of a tip at three stations comes near to 0 between these, by their
+    lengths; the bend of the squares, its length where it is nearest, and how many steps that is behind the middle."""
+    slope, bend = 0.5 * (three * three - one * one), one * one - 2.0 * (two * two) + three * three
+    turns = (bend > 0.0) & (slope * slope <= bend * bend)
+    at = -1.0 * slope / choose(turns, bend, 1.0)
+    first, middle, last = vector(before, 2 * t, 0), vector(before, 2 * t + 1, 0), vector(now, t, 0)
+    rate = times(0.5, add(last, times(-1.0, first)))
+    curve = times(0.5, add(add(first, last), times(-2.0, middle)))
+    for _ in range(CLOSER):
+        p, v = add(middle, times(at, add(rate, times(at, curve)))), add(rate, times(2.0 * at, curve))
+        grows = dot(v, v) + 2.0 * dot(p, curve)
+        at = at - choose(grows > 0.0, dot(p, v) / choose(grows > 0.0, grows, 1.0), 0.0)
+        at = choose(at > 1.0, 1.0, choose(at < -1.0, -1.0, at))
+    p = add(middle, times(at, add(rate, times(at, curve))))
+    return turns, bend, root(dot(p, p)), at
 
 
 @called

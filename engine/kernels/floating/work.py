@@ -30,7 +30,7 @@ class Work(NamedTuple):
     now: value, rate and acceleration; base (J, 9): attitudes of spherical joints at the start of the step; cells, and
     gathered (GATHERED): those of tracks that are looked up; piece (PIECE + 1): of a motion; turning (B, TURNING), and
     implied (C (n + 1), 3): what each mode and the sprung mass add to the acceleration at a contact; rigid (B, RIGID):
-    attitudes and positions of the frames of the rigid arm, as in frames."""
+    attitudes and positions of the frames of the rigid arm, as in frames; tips (T, 3): how far tips are from there."""
 
     frames: FloatArray
     joints: FloatArray
@@ -45,6 +45,7 @@ class Work(NamedTuple):
     turning: FloatArray
     implied: FloatArray
     rigid: FloatArray
+    tips: FloatArray
 
 
 @copied
@@ -67,6 +68,7 @@ def room(system, lane):
         np.zeros((system.tree.shape[0], TURNING, LANES)),
         np.zeros((system.riders.shape[0] * (widest + 1), 3, LANES)),
         np.zeros((system.tree.shape[0], RIGID, LANES)),
+        np.zeros((system.tips.shape[0], 3, LANES)),
     )
 
 

@@ -7,6 +7,7 @@ import pytest
 
 from engine.floating.march import march
 from engine.floating.model import build
+from engine.floating.results import outcome
 from engine.scene.motions.point_to_point import PointToPoint
 from engine.scene.study import Study
 from engine.scene.variants import VariantValues
@@ -133,6 +134,21 @@ def test_a_joint_moves_from_point_to_point_as_a_carriage_does(jerk: float | None
         torque = found.history[v, :, 0]
         assert torque[smooth] == pytest.approx(inertia * path.ddS[smooth] / own.time_scale**2, abs=1e-9)
         assert torque[-1] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("gravity", [GRAVITY, 0.0])
+def test_what_jumps_between_stations_is_observed_on_both_sides(gravity: float) -> None:
+    """The largest torque is that of the last moment of braking, downwards; its mean square that of constant pieces."""
+    down = {"kind": "point-to-point", "start": 1.1, "end": 0.2, "speed": 2.0, "acceleration": 8.0}
+    model, marched = steps(driven([TURNS | {"motion": down}], TORQUE, gravity=gravity), 1.5, 37)
+    found = outcome(model, marched).numbers
+    half, inertia = 0.5 * LENGTH, INERTIA + MASS * (0.5 * LENGTH) ** 2
+    most = 8.0 * inertia + MASS * gravity * half * np.cos(0.2)
+    assert found["drive_max"][0] == pytest.approx(most, rel=1e-9)
+    if gravity > 0.0:
+        assert found["drive_max_time"][0] == pytest.approx(0.7, rel=1e-9)
+    else:
+        assert found["drive_rms"][0] == pytest.approx(8.0 * inertia * np.sqrt(2.0 * 0.25 / 1.5), rel=1e-9)
 
 
 def by_quarters(part: np.ndarray) -> np.ndarray:

@@ -232,6 +232,18 @@ def test_extremes_after_a_stop_begin_at_the_stop() -> None:
     assert -np.polyfit(np.log(steps), np.log(off), 1)[0] == pytest.approx(2.0, abs=0.2)
 
 
+def test_a_length_is_smallest_where_its_vector_passes_between_stations() -> None:
+    """By squares of lengths, which are below 0 there where steps are long, it was told to be 0, without an error."""
+    joint, sideways = MOVE | {"axis": [0, 1, 0.02]}, {"lateral_second_moment": 3e-8, "lateral_modes": 1}
+    frame, sensor = {"upper": sideways | {"joints": [joint]}}, {"tip": reads("upper", 1.5)}
+    given = arm({"upper": LINK}, frame, sensor=sensor, gravity=0.0)
+    coarse, fine = (studies.run(given.with_values({"solver.steps": n})) for n in (400, 6400))
+    smallest = float(fine["tip_after_stop_min"])
+    assert 0.0 < smallest < 1e-3 * float(fine["tip_after_stop_max"])
+    assert float(coarse["tip"].where(coarse["elapsed"] > 0.5).min()) > 10.0 * smallest
+    assert float(coarse["tip_after_stop_min"]) == pytest.approx(smallest, rel=1e-3)
+
+
 def test_the_answer_tells_how_far_the_tip_strays(coarse: xr.Dataset) -> None:
     said = KIND.findings(Results.of(coarse))
     whole, after = (next(i for i, one in enumerate(said) if word in one) for word in ("tip: the", "After the stop"))
