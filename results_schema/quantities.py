@@ -34,7 +34,8 @@ class Quantity:
     and damper pass on, less what they carry at rest. of_support: no motion, but what a support
     carries; turns: its moment about a direction. of_arm: no deflection of its body, but how far a point is from where
     the rigid arm would have it, whose joints are where their motions say. of_drive: what the drive of a joint of its
-    body exerts. told: its error makes no status, as forces that enter excite every mode. meant: other words for it.
+    body exerts; of_joint: how far a joint of its body has turned or slid. told: its error makes no status, as forces
+    that enter excite every mode. meant: other words for it.
     """
 
     name: str
@@ -51,6 +52,7 @@ class Quantity:
     turns: bool = False
     of_arm: bool = False
     of_drive: bool = False
+    of_joint: bool = False
     told: bool = False
     meant: tuple[str, ...] = ()
 
@@ -58,6 +60,16 @@ class Quantity:
     def has_kinks(self) -> bool:
         """Whether its influence line has a kink or a jump where it is read."""
         return self.of_section or self.derivative > 1
+
+    @property
+    def at_joint(self) -> bool:
+        """Whether it is that of a joint, and of no place of a track."""
+        return self.of_drive or self.of_joint
+
+    @property
+    def of_tree(self) -> bool:
+        """Whether bodies have it only where they hang on joints, as a tree."""
+        return self.of_arm or self.at_joint
 
     @property
     def order(self) -> int:
@@ -78,6 +90,8 @@ _ROWS = (
     Quantity("position_error", "m", of_arm=True, meant=("tip-error", "path-error", "deviation", "tracking-error")),
     Quantity("drive_torque", "N m", of_drive=True, told=True, meant=("torque", "joint-torque", "motor-torque")),
     Quantity("drive_force", "N", of_drive=True, told=True, meant=("joint-force", "motor-force")),
+    Quantity("joint_angle", "rad", of_joint=True, meant=("hinge-angle", "swing-angle")),
+    Quantity("joint_displacement", "m", of_joint=True, meant=("joint-shift", "stroke", "extension")),
     Quantity("rotation", "rad", 1, meant=("end-rotation", "angle", "tilt")),
     Quantity("velocity", "m s-1", rate=1, of_mass=True, told=True),
     Quantity("acceleration", "m s-2", rate=2, of_mass=True, told=True),
@@ -95,7 +109,7 @@ _ROWS = (
 
 def _missing(piece: Any) -> list[str]:
     """What bodies, carriages and arms tell by name is the program's own."""
-    own = ("of_section", "of_contact", "of_suspension", "of_support", "of_arm", "of_drive")
+    own = ("of_section", "of_contact", "of_suspension", "of_support", "of_arm", "of_drive", "of_joint")
     return no_row_of(Quantity)(piece) or [f"{key} = False" for key in own if getattr(piece, key)]
 
 

@@ -92,27 +92,35 @@ def _check_sensor(study: Study, name: str, sensor: Sensor) -> None:
         what = f"in frames that move nothing is read {sensor.side} a track"
         expected, remedy = "no such key", 'quantity = "position_error" at a place of the track takes a direction'
         raise fault(f"{here}.direction", what, expected=expected, remedy=remedy)
-    if sensor.reads.of_drive:
-        _check_drive(study, name, sensor)
+    if sensor.reads.at_joint:
+        _check_joint(study, name, sensor)
     if sensor.under is not None and sensor.quantity != "displacement":
         _refuse_of_carriage(study, here, sensor.quantity, sensor.under, UNDER_CARRIAGE)
 
 
-def _check_drive(study: Study, name: str, sensor: Sensor) -> None:
-    """Refuse a drive that is not there, or of a joint that moves otherwise."""
+#: What is read of joints, of which, what is said of none, and the quantities of those that turn and that slide.
+OF_DRIVES = "drive", "with a motion", "none has one", "drive_torque", "drive_force"
+OF_JOINTS = "angle", "about or along an axis that no drive holds", "none is", "joint_angle", "joint_displacement"
+
+
+def _check_joint(study: Study, name: str, sensor: Sensor) -> None:
+    """Refuse what is read of a joint that is not there, or moves otherwise."""
     fault, on = study.source.fault, str(sensor.body)
     frame = study.frame.get(on) or Frame()
-    found = frame.driven(sensor.joint)
+    whose, such, none, turning, sliding = OF_DRIVES if sensor.reads.of_drive else OF_JOINTS
+    pick = frame.driven if sensor.reads.of_drive else frame.left_to_move
+    found = pick(sensor.joint)
     if len(found) != 1:
         number = "" if sensor.joint is None else f" {sensor.joint}"
-        what = f"the joint{number} of {on} whose drive this reads is not one with a motion"
-        driven = ", ".join(map(str, frame.driven(None)))
-        expected = f"joint: of frame.{on}.joints, counted from 0, one with a motion: {driven or 'none has one'}"
+        what = f"the joint{number} of {on} whose {whose} this reads is not one {such}"
+        known = ", ".join(map(str, pick(None)))
+        expected = f"joint: of frame.{on}.joints, counted from 0, one {such}: {known or none}"
         received = f"{len(found)} such" if sensor.joint is None else f"joint = {sensor.joint}"
         raise fault(f"sensor.{name}.joint", what, expected=expected, received=received)
-    wanted = "drive_torque" if study.frame[on].joints[found[0]].turns else "drive_force"
+    turns = study.frame[on].joints[found[0]].turns
+    wanted = turning if turns else sliding
     if sensor.quantity != wanted:
-        what = f"frame.{on}.joints.{found[0]} {'turns' if wanted == 'drive_torque' else 'slides'}"
+        what = f"frame.{on}.joints.{found[0]} {'turns' if turns else 'slides'}"
         raise fault(f"sensor.{name}.quantity", what, expected=wanted, received=sensor.quantity)
 
 

@@ -221,7 +221,10 @@ def _readings(model: FloatingModel) -> tuple[Array, Counts]:
         name = str(sensor.body)
         body, quantity = model.bodies[name], sensor.reads
         under.append((-1, Z, quantity.rate))
-        if body.omega.size and not (quantity.of_arm or quantity.of_drive):
+        if quantity.of_joint:
+            number = model.frame(name).left_to_move(sensor.joint)[0]
+            row[next(j.coordinate for j in model.joints if (j.body, j.number) == (name, number))] = 1.0
+        elif body.omega.size and not quantity.of_tree:
             first = model.first[name]
             row[first : first + body.omega.size] = body.reading(quantity, sensor.at)
     depths = _depths(model)

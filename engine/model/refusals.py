@@ -36,7 +36,7 @@ def check_stands(study: Study) -> None:
             remedy = f'a body on contacts has an inertia; kind = "{FRAMES[0]}"'
             raise study.source.fault(f"carriage.{name}.{key}", what, expected="left out", remedy=remedy)
     for name, sensor in study.sensor.items():
-        if sensor.reads.of_arm or sensor.reads.of_drive:
+        if sensor.reads.of_tree:
             what = f"in studies of the kind {study.kind} bodies stand: no joints carry an arm"
             expected = f'kind = "{FRAMES[0]}", or quantity = "displacement"'
             raise study.source.fault(f"sensor.{name}.quantity", what, expected=expected, received=sensor.quantity)

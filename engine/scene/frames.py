@@ -224,6 +224,11 @@ class Frame(Spec):
         """The numbers of its joints that have a motion, or of these the one that is asked for."""
         return [k for k, own in enumerate(self.joints) if own.is_told and joint in (None, k)]
 
+    def left_to_move(self, joint: int | None) -> list[int]:
+        """The numbers of its joints about or along one axis that no drive holds, or of these the one asked for."""
+        left = [k for k, own in enumerate(self.joints) if own.freedoms == 1 and not own.is_driven]
+        return [k for k in left if joint in (None, k)]
+
     @model_validator(mode="after")
     def _fitting_keys(self) -> Frame:
         if self.on == GROUND and self.at is not None:

@@ -29,11 +29,7 @@ def _along_a_body(word: str) -> str:
 
 def quantities_of_a_body() -> list[str]:
     """The quantities that can be read of bodies, whether their frames move or not."""
-    return [
-        name
-        for name, quantity in QUANTITIES.items()
-        if not (quantity.of_contact or quantity.of_arm or quantity.of_drive)
-    ]
+    return [name for name, quantity in QUANTITIES.items() if not (quantity.of_contact or quantity.of_tree)]
 
 
 OwnTolerance = Annotated[
@@ -58,16 +54,14 @@ def _check_limit(limit: float | None, reads: Quantity) -> None:
 
 
 def _check_band(sensor: Sensor) -> None:
-    if sensor.settling_band is not None and sensor.reads.unit != "m":
+    if sensor.settling_band is not None and (sensor.reads.unit != "m" or sensor.reads.of_joint):
         expected = 'quantity = "displacement", or "position_error" where frames move'
         raise fault("a settling_band is one of displacements", expected=expected)
 
 
 def _check_part(sensor: Sensor) -> None:
-    if sensor.part != "whole" and (sensor.reads.rate or sensor.reads.of_arm or sensor.reads.of_drive):
-        known = ", ".join(
-            name for name, quantity in QUANTITIES.items() if not (quantity.rate or quantity.of_arm or quantity.of_drive)
-        )
+    if sensor.part != "whole" and (sensor.reads.rate or sensor.reads.of_tree):
+        known = ", ".join(name for name, quantity in QUANTITIES.items() if not (quantity.rate or quantity.of_tree))
         expected, remedy = f"quantity: one of {known}", "leave part out"
         raise fault(f"statics have no {sensor.quantity}, all of it is dynamic", expected=expected, remedy=remedy)
 
@@ -110,10 +104,11 @@ def _check_direction(sensor: Sensor) -> None:
         raise fault("only nodes and members are read in a direction", expected=expected, remedy=remedy)
 
 
-def _check_drive(sensor: Sensor) -> None:
-    if sensor.joint is not None and not sensor.reads.of_drive:
-        raise fault("only drives are read at a joint", expected='quantity = "drive_torque" or "drive_force"')
-    if sensor.reads.of_drive and sensor.fixed_place != 0.0:
+def _check_joint(sensor: Sensor) -> None:
+    if sensor.joint is not None and not sensor.reads.at_joint:
+        known = ", ".join(name for name, quantity in QUANTITIES.items() if quantity.at_joint)
+        raise fault(f"a {sensor.quantity} is not that of a joint", expected=f"quantity: one of {known}")
+    if sensor.reads.at_joint and sensor.fixed_place != 0.0:
         raise fault(
             f"a {sensor.quantity} is that of a joint of a body", expected='body = "a body" alone, or with joint'
         )
@@ -125,8 +120,8 @@ class Sensor(Spec):
     along gravity or "along" or "across" the track), of a carriage's own sprung mass (`carriage`), the contact force of
     a carriage (of a body that rides, that at one `contact`), what a support at a place of a beam or at a node carries
     (its moment at a node alone), how far a place of a track is from where the rigid arm would have it (the length of
-    that, or in a direction over the ground), or what the drive of a `joint` of its body exerts (by number; the only one
-    with a motion if not given).
+    that, or in a direction over the ground), or what the drive of a `joint` of its body exerts, or how far one has
+    turned or slid (by number; the only such one if not given).
 
     With `under` or `carriage`, the body is that of the carriage and need not be named. tolerance: of its own, in place
     of `solver.tolerance`; "told": its error is told and makes no status, as for velocities, accelerations and contact
@@ -158,7 +153,7 @@ class Sensor(Spec):
     def _at_its_joint(cls, data: Any) -> Any:
         """A joint is where the track of its body begins."""
         quantity = QUANTITIES.get(str(data.get("quantity"))) if isinstance(data, dict) else None
-        return {"at": 0.0} | data if quantity is not None and quantity.of_drive else data
+        return {"at": 0.0} | data if quantity is not None and quantity.at_joint else data
 
     @model_validator(mode="after")
     def _one_place(self) -> Sensor:
@@ -175,7 +170,7 @@ class Sensor(Spec):
         _check_moment(self)
         _check_band(self)
         _check_error(self)
-        _check_drive(self)
+        _check_joint(self)
         _check_part(self)
         _check_direction(self)
         if self.spot is not None and (self.reads.derivative or self.reads.of_contact):

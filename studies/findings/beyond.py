@@ -30,7 +30,7 @@ LIMIT = " Its absolute value exceeds "
 LIMITED = (
     *("displacement", "rotation", "velocity", "acceleration", "bending_moment", "shear_force", "axial_force", "stress"),
     *("support_reaction", "support_moment", "contact_force", "suspension_force", "position_error"),
-    *("drive_torque", "drive_force"),
+    *("drive_torque", "drive_force", "joint_angle", "joint_displacement"),
 )
 
 

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from engine.scene.study import Study
 from engine.study_file.spec import Spec
-from engine.study_file.units import Force, Length, Time, Torque
+from engine.study_file.units import Angle, Force, Length, Time, Torque
 from studies.findings.beyond import Limits
 
 
@@ -27,6 +27,8 @@ class Question(Limits):
     position_error: Annotated[Length, Field(gt=0)] | None = None
     drive_torque: Annotated[Torque, Field(gt=0)] | None = None
     drive_force: Annotated[Force, Field(gt=0)] | None = None
+    joint_angle: Annotated[Angle, Field(gt=0)] | None = None
+    joint_displacement: Annotated[Length, Field(gt=0)] | None = None
     residual: AfterStop = AfterStop()
     settling_time: Annotated[Time, Field(gt=0)] | None = None
 

@@ -170,7 +170,7 @@ def _reads_nothing(looked: Looked) -> Iterator[str]:
     """Of the first scene: sensors at places of bodies that do not bend, or not there."""
     model = looked.samples[0].model
     for name, sensor in model.study.sensor.items():
-        if sensor.under is not None or sensor.reads.of_arm or sensor.reads.of_drive or sensor.at is None:
+        if sensor.under is not None or sensor.reads.of_tree or sensor.at is None:
             continue
         body = model.bodies[str(sensor.body)]
         rows = [body.reading(sensor.reads, x) for x in (sensor.at, *np.linspace(0.0, body.length, PLACES))]

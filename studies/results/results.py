@@ -148,7 +148,7 @@ class Results:
             sprung = own.reads.of_mass and self.study.carriage[own.rides].suspension is not None
             of = "of the sprung mass of" if sprung else "of"
             return f"{spot}{'under' if own.under else of} {own.rides}{own.way_in_words}"
-        if own.reads.of_drive:
+        if own.reads.at_joint:
             return f"of {own.body}" if own.joint is None else f"of joint {own.joint} of {own.body}"
         if own.at is None:
             return f"at {own.node or own.point}{own.way_in_words}"
@@ -160,7 +160,7 @@ class Results:
         """Whether it reads a displacement along gravity, which points down as the body hangs."""
         own, body = self.study.sensor[sensor], self.study.body[self.study.body_of(sensor)]
         along_gravity = own.node is not None or own.member is not None or body.deflects_down(own.point)
-        return self.sensors[sensor] == "m" and own.direction is None and along_gravity and not own.reads.of_arm
+        return self.sensors[sensor] == "m" and own.direction is None and along_gravity and not own.reads.of_tree
 
     def hangs_along(self, envelope: str) -> bool:
         """The same of an envelope."""

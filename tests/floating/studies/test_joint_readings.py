@@ -1,0 +1,108 @@
+"""How far joints have turned or slid: closed forms, and what is refused."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import studies
+from engine.scene.study import Study
+from results_schema.errors import BadInput
+from studies.findings.absolute_errors import absolute_errors
+from studies.protocol.study import kind_of
+from studies.results.results import Results
+
+GRAVITY, MASS, LENGTH, INERTIA, STIFFNESS = 9.81, 3.0, 0.8, 0.2, 5e3
+ARM = {"kind": "rigid", "length": LENGTH, "mass": MASS, "inertia": INERTIA, "own_weight": True}
+SPRUNG = {"kind": "prismatic", "axis": [0, 0, 1], "stiffness": STIFFNESS}
+SWINGS = {"kind": "revolute", "axis": [0, 1, 0], "start": 1.2}
+DRIVEN = {"kind": "revolute", "axis": [0, 1, 0], "motion": {"kind": "steady", "rate": 1.0}}
+ANGLE, SHIFT = {"body": "arm", "quantity": "joint_angle"}, {"body": "arm", "quantity": "joint_displacement"}
+
+
+def held_by(joints: list[dict[str, Any]], sensor: dict[str, Any], **more: Any) -> Study:
+    return Study(
+        kind="moving-frames",
+        gravity=GRAVITY,
+        body={"arm": ARM},
+        frame={"arm": {"joints": joints} | more},
+        sensor={"joint": sensor},
+        question={"duration": 2.0},
+    )
+
+
+def test_what_falls_into_a_spring() -> None:
+    """m g/k (1 - cos wt), and no error told too small."""
+    found = studies.run(held_by([SPRUNG], SHIFT))
+    sag, omega = MASS * GRAVITY / STIFFNESS, np.sqrt(STIFFNESS / MASS)
+    assert found["joint"].attrs["units"] == found["joint_max"].attrs["units"] == "m"
+    apart = abs(float(found["joint_max"]) - 2.0 * sag)
+    assert apart <= float(absolute_errors(Results.of(found), "joint_max")) < 2e-3 * sag
+    wanted = sag * (1.0 - np.cos(omega * found["elapsed"].values))
+    assert np.abs(found["joint"].values - wanted).max() < 2e-3 * sag
+
+
+def test_a_pendulum_swings_as_far_to_the_other_side() -> None:
+    """About y, from 1.2 rad above the level: it hangs at -pi/2."""
+    found = studies.run(held_by([SWINGS], ANGLE))
+    assert found["joint_max"].attrs["units"] == "rad"
+    assert float(found["joint_max"]) == pytest.approx(1.2, abs=1e-9)
+    assert float(found["joint_min"]) == pytest.approx(-np.pi - 1.2, rel=1e-3)
+
+
+def test_one_of_several_joints_by_its_number() -> None:
+    along = SPRUNG | {"axis": [1, 0, 0], "stiffness": 1e7}
+    angle = studies.run(held_by([SWINGS, along], ANGLE | {"joint": 0}))
+    shift = studies.run(held_by([SWINGS, along], SHIFT | {"joint": 1}))
+    assert float(angle["joint_min"]) == pytest.approx(-np.pi - 1.2, rel=1e-2)
+    assert 0.0 < float(shift["joint_max"]) < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("joints", "sensor", "words"),
+    [
+        ([DRIVEN], ANGLE, r"sensor\.joint\.joint: the joint of arm whose angle this reads is not one.*none is"),
+        ([SPRUNG, SPRUNG], SHIFT, "received 2 such"),
+        ([SPRUNG], SHIFT | {"joint": 1}, "the joint 1 of arm"),
+        ([SPRUNG], ANGLE, r"joints\.0 slides; expected joint_displacement"),
+        ([SWINGS], SHIFT, r"joints\.0 turns; expected joint_angle"),
+    ],
+)
+def test_joints_that_are_not_there_are_refused(joints: Any, sensor: Any, words: str) -> None:
+    study = held_by(joints, sensor)
+    with pytest.raises(BadInput, match=words):
+        kind_of(study).parts(study)
+
+
+@pytest.mark.parametrize("sensor", [ANGLE | {"at": 0.5}, {"body": "arm", "at": 0.1, "joint": 0}])
+def test_a_joint_has_no_place(sensor: Any) -> None:
+    with pytest.raises(BadInput, match="joint"):
+        held_by([SWINGS], sensor)
+
+
+def test_where_bodies_stand_there_are_no_joints() -> None:
+    study = Study(
+        kind="passage",
+        body={
+            "beam": {
+                "kind": "beam",
+                "length": 2.0,
+                "area": 1e-3,
+                "second_moment": 1e-7,
+                "youngs_modulus": 7e10,
+                "density": 2700.0,
+                "supports": "pinned-pinned",
+            }
+        },
+        carriage={
+            "load": {
+                "kind": "force",
+                "on": "beam",
+                "force": 1.0,
+                "motion": {"kind": "cruise", "start": 0.0, "end": 2.0, "speed": 1.0},
+            }
+        },
+        sensor={"joint": ANGLE | {"body": "beam"}},
+    )
+    with pytest.raises(BadInput, match="no joints carry an arm"):
+        studies.run(study)
