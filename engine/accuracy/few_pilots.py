@@ -27,11 +27,15 @@ class FewPilots:
 
     def told(self, columns: Mapping[str, Array], size: int) -> Array:
         """(R, V) errors of so many variants by their swept numbers: the largest of their nearest pilots' times what
-        pilots' own are larger than their neighbours tell, but for a few; NaN where no pilot has an estimate."""
-        near = np.empty((size, min(NEAREST, self.error.shape[1])), dtype=np.int32)
-        nearest(self._places(columns, size), self._pilots, near)
+        pilots' own are larger than their neighbours tell, but for a few; NaN where no pilot has an estimate. Of what is
+        a pilot itself its own."""
+        near, places = np.empty((size, min(NEAREST, self.error.shape[1])), dtype=np.int32), self._places(columns, size)
+        nearest(places, self._pilots, near)
         largest = np.fmax.reduce(self.error, axis=1)[:, None]
-        return np.asarray(np.fmin(self._margin * np.fmax.reduce(self.error[:, near], axis=2), MOST * largest))
+        found = np.fmin(self._margin * np.fmax.reduce(self.error[:, near], axis=2), MOST * largest)
+        own = self.error[:, near[:, 0]]
+        is_pilot = np.all(places == self._pilots.T[near[:, 0]], axis=1) & ~np.isnan(own)
+        return np.asarray(np.where(is_pilot, own, found))
 
     @cached_property
     def _pilots(self) -> Array:

@@ -32,6 +32,15 @@ def test_what_neighbours_tell_too_little_of_grows_for_all() -> None:
     assert found[1] == pytest.approx(MOST)
 
 
+def test_what_is_a_pilot_has_its_own_error() -> None:
+    """Where one swept number decides whether what is fixed matters, its neighbours tell a thousand times too much."""
+    error = np.array([[1e-5, 1e-2, 1e-5], [np.nan, 1.0, 1.0]])
+    found = told(FewPilots({"mass": np.array([-0.4, 0.0, 0.4])}, error), -0.4, 0.0, 0.4, 0.1)
+    assert found[0, :3] == pytest.approx(error[0])
+    assert found[0, 3] >= 1e-2
+    assert found[1, 0] >= 1.0
+
+
 def test_pilots_without_an_estimate_say_nothing() -> None:
     error = np.array([[1.0, np.nan, 3.0], [np.nan] * 3, [0.0] * 3])
     found = told(FewPilots({"mass": np.array([1.0, 2.0, 3.0])}, error), 1.1, 2.9)
