@@ -28,6 +28,7 @@ LONGER = 1.0 + 1e-9  # times a duration: less is rounding
 PLACES = 17  # of a track, at which the largest of a reading is looked for
 ROUNDING = 1e-9  # of that: less is rounding
 Y, Z = 1, 2
+ACROSS = 0.9  # of an axis: about which a track that bends downwards turns
 TURN = np.pi  # rad: joints seldom turn further, and not by whole numbers of radians
 
 
@@ -183,6 +184,22 @@ def _reads_nothing(looked: Looked) -> Iterator[str]:
             )
 
 
+def _clamped_at_a_hinge(looked: Looked) -> Iterator[str]:
+    """Beams whose shapes do not turn where a hinge lets them, which takes many of them."""
+    study = looked.study
+    for name, frame in study.frame.items():
+        hinge, told = frame.joints[-1:], str(study.data["body"][name].get("supports"))
+        here = f"frame.{name}.joints.{len(frame.joints) - 1}"
+        if not (hinge and hinge[0].freedoms == 1 and hinge[0].turns_freely and told.startswith("clamped-")):
+            continue
+        about = np.abs(np.asarray(study.value(f"{here}.axis")))
+        if about[Y] > ACROSS * np.linalg.norm(about):
+            yield (
+                f"{name} is clamped where {here} turns freely: no moment acts there, and clamped shapes need many "
+                f'modes to say so; body.{name}.supports = "pinned-{told.partition("-")[2]}" takes a few'
+            )
+
+
 def _nothing_across(looked: Looked) -> Iterator[str]:
     """Position errors across the plane in which an arm bends and its joints move it."""
     model = looked.samples[0].model
@@ -275,5 +292,5 @@ def _doubtful(looked: Looked) -> Iterator[str]:
 REMARKS: tuple[Callable[[Looked], Iterator[str]], ...]
 REMARKS = (
     _doubtful, _degrees, _turned_fast, _over_an_end, _goes_on, _stands, _reads_nothing, _nothing_across, _moved_across,
-    _let_go,
+    _let_go, _clamped_at_a_hinge,
 )  # fmt: skip

@@ -16,6 +16,7 @@ def turned_to(*values: Any, **more: Any) -> Study:
 
 
 HUNG = {"arm": {"joints": [TURN]}, "tool": {"on": "arm"}}
+HINGE = {"kind": "revolute", "axis": [0, 1, 0]}
 SPIN = {"kind": "revolute", "axis": [0, 1, 0], "motion": {"kind": "spin-up", "rate": 0.1, "time": 2.0}}
 SLIDE = {"kind": "prismatic", "axis": [0, 1, 0], "motion": {"kind": "waypoints", "times": [0, 1], "values": [0, 0.1]}}
 LATER = TURN | {"motion": {"kind": "waypoints", "times": [0, 1.5], "values": [0, -0.1]}}
@@ -64,6 +65,9 @@ SAID = {
         driven(sensor={"side": ASIDE})
     ),
     'arm starts undeformed, so that weight sets it swinging at time 0; initial = "equilibrium"': heavy(),
+    "arm is clamped where frame.arm.joints.0 turns freely: no moment acts there, and clamped shapes need many modes": (
+        driven(joints=[HINGE])
+    ),
     "sensor low reads 0: its body has no bending moment there, as at a support or a free end": driven(
         sensor={"low": {"body": "arm", "at": 10.0, "quantity": "bending_moment"}}
     ),
@@ -94,4 +98,6 @@ def test_nothing_is_remarked_of_ordinary_studies() -> None:
     (said,) = KIND.remarks(heavy(frame={"arm": aside}))  # its weight does not set it swinging, nor does its joint
     assert said.startswith("frame.arm.joints.0 turns arm across the plane in which it bends")
     assert KIND.remarks(heavy(frame={"arm": {"joints": [TURN], "turned": [0, "90 deg", 0]}})) == ()  # upright
-    assert len(REMARKS) == 10
+    pinned = driven(arm={"supports": "pinned-free"}, joints=[HINGE])
+    assert KIND.remarks(pinned) == KIND.remarks(driven(joints=[HINGE | {"stiffness": 1e4}])) == ()
+    assert len(REMARKS) == 11
