@@ -203,6 +203,7 @@ def test_levels_of_many_fixed_steps_double_the_modes_twice_at_least() -> None:
     assert np.all(converged.level == 2) and converged.error.max() < 1e-4
 
 
+@pytest.mark.slow
 def test_a_train_is_told_about_what_it_is_off_by() -> None:
     """Forces that enter one after the other: what they bend converges fast, what they shake slowly."""
     axles = {f"axle{n}": force(1.0, cruise(0.0, 1.0, 0.8), headway=0.12 * n) for n in range(4)}

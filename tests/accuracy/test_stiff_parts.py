@@ -61,6 +61,7 @@ def test_what_nobody_could_estimate_is_unresolved_though_nothing_is_held() -> No
     assert any("1 unresolved" in text for text in studies.answer(found))
 
 
+@pytest.mark.slow
 def test_what_moves_slowly_on_stiff_contacts_needs_no_step_for_each_of_their_periods() -> None:
     """A table that ran slowly along a bed took 40 s, and was unresolved; one that is dropped swings on its contacts."""
     stiff = {name: {"at": at, "stiffness": 4e6, "damping": 50.0} for name, at in (("rear", 0.05), ("front", 0.35))}

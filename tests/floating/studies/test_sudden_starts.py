@@ -32,7 +32,9 @@ def test_the_last_modes_that_get_through_have_their_values() -> None:
         assert off < float(told.sel(result=name)) < 0.05, name
 
 
-@pytest.mark.parametrize(("modes", "status"), [(4, Status.OK), (8, Status.UNRESOLVED)])
+@pytest.mark.parametrize(
+    ("modes", "status"), [(4, Status.OK), pytest.param(8, Status.UNRESOLVED, marks=pytest.mark.slow)]
+)
 def test_errors_of_fixed_modes_are_told_by_twice_as_many_or_not_at_all(modes: int, status: Status) -> None:
     """With four times as many none gets through; none was told, and both were ok."""
     found = studies.run(let_go(modes=modes))
