@@ -314,21 +314,22 @@ def tolerance_span(asked: Asked, cases: Cases) -> tuple[float, float]:
 
 
 def coordinates(cases: Cases, variants: Counts) -> Array:
-    """(V, D) places of variants along the axes of the sweep, from 0 to 1, by cube roots: these go nearly with ratios
-    where an axis spans large ones, and part what is undamped from what is damped. By the values themselves 34 random
-    sweeps took 1.4 times the work, and 1.2 % of displacements missed in place of 0.8."""
+    """(V, D) places of variants along the axes of the sweep, from 0 to 1: by logarithms where one goes by ratios, as
+    errors go by powers (of 90 random sweeps 1.7 % of errors were told too small, by cube roots 1.9, by the same work);
+    else by cube roots, which part what is undamped from what is damped (by values 34 took 1.4 times the work)."""
     positions = cases.positions(variants)
     columns = []
     for axis in _varied(cases):
-        low, high = axis.root_ends
-        roots = np.cbrt(np.asarray(axis.values[positions[axis.dim]], dtype=np.float64))
-        columns.append((roots - low) / (high - low))
+        scaled = np.log if axis.goes_by_ratios else np.cbrt
+        low, high = scaled(axis.ends)
+        own = np.asarray(axis.values[positions[axis.dim]], dtype=np.float64)
+        columns.append((scaled(own) - low) / (high - low))
     return np.stack(columns, axis=1) if columns else np.zeros((variants.size, 1))
 
 
 def _varied(cases: Cases) -> list[Axis]:
     """The axes along which places of variants differ."""
-    return [axis for axis in axes_of_scene(cases) if axis.root_ends[0] < axis.root_ends[1]]
+    return [axis for axis in axes_of_scene(cases) if axis.ends[0] < axis.ends[1]]
 
 
 def _sets_modes(cases: Cases) -> Mask:

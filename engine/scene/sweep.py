@@ -18,6 +18,7 @@ from results_schema.errors import BadInput
 
 MAX_VARIANTS = 2**31
 MAX_AXIS = 2**24
+TWO_DECADES = 100.0
 CHECKED_AT_ONCE = 2**18
 VARIANT = "variant"
 
@@ -46,10 +47,15 @@ class Axis:
         return tuple(self.targets)
 
     @cached_property
-    def root_ends(self) -> tuple[float, float]:
-        """The cube roots of its smallest and its largest value."""
-        roots = np.cbrt(np.asarray(self.values, dtype=np.float64))
-        return float(roots.min()), float(roots.max())
+    def ends(self) -> tuple[float, float]:
+        """Its smallest and its largest value."""
+        return float(self.values.min()), float(self.values.max())
+
+    @property
+    def goes_by_ratios(self) -> bool:
+        """Whether what depends on it does so nearly by a power of its values: all positive, within two decades."""
+        least, most = self.ends
+        return least > 0.0 and most <= TWO_DECADES * least
 
     def columns(self, entries: Any) -> dict[str, Any]:
         """What it sets at some entries of its values, by dotted key."""

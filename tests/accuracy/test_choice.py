@@ -95,16 +95,16 @@ def test_more_variants_have_more_pilots() -> None:
 
 
 def test_distances_know_axes_of_more_than_one_value() -> None:
-    """From 0 to 1, by cube roots; not the tolerance."""
+    """From 0 to 1, by logarithms within two decades, beyond by cube roots; not the tolerance."""
     sweep = {
-        "narrow": {"of": WEIGHT, "values": [1.0, 3.375, 8.0]},
+        "narrow": {"of": WEIGHT, "values": [1.0, 2.0, 8.0]},
         "far": {"of": SPEED, "values": [0.008, 1.0, 8.0]},
         "wanted": {"of": TOLERANCE, "values": [1e-3, 1e-2]},
         "alone": {"of": "body.bed.damping_ratio", "values": [0.02]},
     }
     cases = make_plan(passages(sweep=sweep)).cases
     found = coordinates(cases, np.arange(cases.size)).reshape(3, 3, 2, 2)
-    np.testing.assert_allclose(found[:, 0, 0, 0], [0.0, 0.5, 1.0])
+    np.testing.assert_allclose(found[:, 0, 0, 0], [0.0, 1.0 / 3.0, 1.0])
     np.testing.assert_allclose(found[0, :, 0, 1], [0.0, 0.8 / 1.8, 1.0])
     np.testing.assert_array_equal(found[:, :, 0], found[:, :, 1])
 
