@@ -63,6 +63,12 @@ def check_rigid_modes(model: SceneModel) -> None:
                 remedy='supports that hold every direction, such as supports.NODE = ["x"] of a frame that may slide; '
                 "bodies that ride take own_weight = false",
             )
+        if part.own_weight and part.modal.unknown_weight:
+            raise model.study.source.fault(
+                f"body.{part.name}.own_weight",
+                part.modal.unknown_weight,
+                expected="own_weight = false, or a model whose nodes on springs are kept when it is reduced",
+            )
         if number in riding:
             continue
         if part.modal.rigid_modes == len(part.modal.omega):

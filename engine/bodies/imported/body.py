@@ -11,7 +11,7 @@ import numpy as np
 
 from engine.bodies.frame.body import settled
 from engine.bodies.frame.geometry import unit
-from engine.bodies.imported.findings import doubts, findings
+from engine.bodies.imported.findings import doubts, findings, unknown_weight
 from engine.bodies.imported.line import (
     LinePushes,
     LineRecovered,
@@ -107,6 +107,7 @@ def _modal_body(body: Imported, spots: Spots) -> tuple[ModalBody, LineStatics]:
         sides=sides,
         checks=findings(body, held, line),
         doubts=doubts(body, held),
+        unknown_weight=unknown_weight(held),
     )
     return found, statics
 

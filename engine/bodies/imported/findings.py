@@ -13,6 +13,7 @@ from results_schema.lazy_imports import sparse
 
 if TYPE_CHECKING:
     from engine.bodies.imported.imported import Imported
+    from results_schema.arrays import Array
 
 
 FITS = 1e-6  # of the stiffness: less resists rigid motions by rounding
@@ -21,6 +22,10 @@ SAME_MASS = 1e-6  # relative difference of the mass in three directions that is 
 UNLIKE = 1.5  # times the mass in another direction: what moves at held nodes is not counted, and is less
 #: kg for every metre of track: a fishing rod has 0.05, the heaviest bridges have 1e5.
 LEAST_PER_METRE, MOST_PER_METRE = 1e-2, 3e5
+#: Of the forces that meet at a node, which a rigid motion leaves there, and of nodes: springs to the ground stand at a
+#: few of these. With nodes in another order, or axes exchanged, all of a gantry's 25 nodes answer, by 0.1 to 1.
+ANSWERS, MOST_ANSWER = 0.05, 0.5
+ONE_WEIGHT = 1e-2  # relative difference of the mass in three directions beyond which a reduced model hides springs
 SHEAR = 0.02  # relative difference of rotations and slopes beyond which the spline is worth a thought
 
 
@@ -47,16 +52,21 @@ def findings(body: Imported, held: HeldModel, along: LineShapes) -> tuple[tuple[
 
 
 def doubts(body: Imported, held: HeldModel) -> tuple[str, ...]:
-    """What is likely a mistake: of a model that the study holds, a stiffness that moves otherwise than its nodes; a
-    mass that is another in other directions, or that no structure of this length has."""
+    """What is likely a mistake: a stiffness that moves otherwise than its nodes; a mass that is another in other
+    directions, or that no structure of this length has."""
     found, resisted = list[str](), _resisted(held)
     if resisted is not None and resisted >= DOUBTFUL and body.supports:
         found.append(
             f"{resisted:.2g} of its stiffness resists rigid motions by the coordinates of its nodes: unless its "
             "matrices hold it besides its supports, nodes are in another unit (length_unit), or freedoms are exchanged"
         )
-    masses = np.diag(held.inertia)[:3]
-    moved, ways = masses[masses > 0.0], ", ".join(np.array(["x", "y", "z"])[masses > 0.0])
+    elif resisted is not None and not body.supports and _answering(held) > MOST_ANSWER:
+        found.append(
+            f"{100.0 * _answering(held):.0f} % of its nodes resist rigid motions by their coordinates: unless springs "
+            "hold so many to the ground, nodes stand in another order, are in another unit (length_unit), or have "
+            "their axes or freedoms exchanged"
+        )
+    moved, ways = _masses(held)
     if moved.size and moved.max() > UNLIKE * moved.min():
         found.append(
             f"its mass is {', '.join(f'{mass:.4g}' for mass in moved)} kg along {ways}: are rows of its matrices in "
@@ -68,6 +78,30 @@ def doubts(body: Imported, held: HeldModel) -> tuple[str, ...]:
             "and the like)?"
         )
     return tuple(found)
+
+
+def unknown_weight(held: HeldModel) -> str:
+    """Why nobody knows what a reduced model weighs, "" where its rigid motions tell: what stands on springs inside
+    moves otherwise than its nodes."""
+    moved, ways = _masses(held)
+    if held.file.owner.min() >= 0 or not moved.size or np.ptp(moved) <= ONE_WEIGHT * moved.max():
+        return ""
+    masses = ", ".join(f"{mass:.6g}" for mass in moved)
+    return f"by the rigid motions of its nodes its mass is {masses} kg along {ways}: inside, it stands on springs"
+
+
+def _masses(held: HeldModel) -> tuple[Array, str]:
+    """The mass in each direction in which nodes move, kg, and these directions."""
+    masses = np.diag(held.inertia)[:3]
+    return masses[masses > 0.0], ", ".join(np.array(["x", "y", "z"])[masses > 0.0])
+
+
+def _answering(held: HeldModel) -> float:
+    """The part of the nodes at which the unsupported model answers a rigid motion."""
+    file, nodes = held.file, np.flatnonzero(held.file.owner >= 0)
+    meeting = abs(file.stiffness) @ abs(held.motion)
+    left = np.divide(abs(file.stiffness @ held.motion), meeting, out=np.zeros_like(meeting), where=meeting > 0.0)
+    return float(np.unique(file.owner[nodes[left[nodes].max(axis=1) > ANSWERS]]).size / len(file.nodes))
 
 
 def _grounding(resisted: float | None) -> str:
@@ -94,15 +128,13 @@ def _resisted(held: HeldModel) -> float | None:
 
 def _mass(held: HeldModel, resisted: float | None) -> str:
     """What unit motions of all nodes move: the same in every direction in which nodes move, of a model that fits."""
-    masses = np.diag(held.inertia)[:3]
-    moves = masses > 0.0
-    if not moves.any():
+    moved, ways = _masses(held)
+    if not moved.size:
         return "none"
-    moved, ways = masses[moves], ", ".join(np.array(["x", "y", "z"])[moves])
     if np.ptp(moved) > SAME_MASS * moved.max():
         words = f"{', '.join(f'{mass:.6g}' for mass in moved)} kg along {ways}: not the same"
     else:
-        words = f"{moved[0]:.6g} kg {'in all directions' if moves.all() else f'along {ways}'}"
+        words = f"{moved[0]:.6g} kg {'in all directions' if moved.size == 3 else f'along {ways}'}"
     partly = resisted is not None and resisted > FITS
     return f"{words}; what moves at held or left out nodes is not counted" if partly else words
 

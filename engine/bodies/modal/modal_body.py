@@ -210,6 +210,7 @@ class ModalBody:
     sections            section forces of bodies whose track is not one uniform beam; None: -E I w'' and its derivative
     checks              what a body out of foreign files was checked for, and what was found, in words
     doubts              what of these is likely a mistake, in words
+    unknown_weight      why nobody knows what it weighs, in words
     """
 
     length: float
@@ -231,6 +232,7 @@ class ModalBody:
     sides: Mapping[Direction, SideMotion] = field(default_factory=dict)
     checks: tuple[tuple[str, str], ...] = ()
     doubts: tuple[str, ...] = ()
+    unknown_weight: str = ""
     _fixed: dict[tuple[float, int], Array] = field(default_factory=dict, init=False, repr=False)
 
     @property
