@@ -1,6 +1,7 @@
 """Remarks of carriages: swept limits of motions that some variants do not reach, wheels that stay level, runs that end
 with a train, loads that vanish on their way or point up, masses that hardly swing on their springs; and bands of
-settling that are no band; units that are a prefix off."""
+settling that are no band; units that are a prefix off; carriages that load nothing, and bodies that hardly move as they
+are damped so much."""
 
 from __future__ import annotations
 
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from engine.batch.plan import Plan
+from engine.model.lane_table import weight
 from engine.scene.study import Study
 from engine.scene.variants import SpringKeys
 from engine.study_file.refusals import value_at
@@ -26,6 +28,7 @@ SHORT = 0.5  # of the length of the body: a way of a load that passes; cranes' a
 WIDE = 0.01  # of the length: a band of settling; cranes sag by a 500th at most, all of which lies within
 SLOW = 0.1  # Hz, of a mass on its spring: vehicles swing at 0.5 to 20 Hz, and at a thirtieth of that on N/m for kN/m
 FARTHEST = 100.0  # m from axle to axle: those of the longest wagons stand 20 m apart
+MOST_DAMPING = 0.3  # of critical: hardly any structure has more
 NEXT_TO_NO_DAMPING = 1e-4  # of critical: springs of steel alone have more; as a ratio is a number of N s/m
 _THOUSANDTHS = re.compile(r"(?<=[\d ./*])m(?:Pa\b|N\b(?=\s*\S))")  # of pascals, and of what loads are not
 #: Of the largest flexibility of a track: up to there accelerations of a footbridge were a seventh above those on rigid
@@ -271,6 +274,34 @@ def has_unit(study: Study, path: str) -> bool:
 
 
 #: In the order in which they are told.
+def loads_nothing(plan: Plan) -> Iterator[str]:
+    """Masses without gravity, of which none pushes otherwise."""
+    loads = (weight(grid.scene, grid.values, n) for grid in plan.grids for n in range(len(grid.scene.carriages)))
+    pushes = any(own.pulsates for own in plan.study.carriage.values()) or plan.base.pushes
+    if not pushes and not any(np.any(load) for load in loads):
+        yield "no carriage loads its body: gravity is 0, and none has a force; all that is read stays 0"
+
+
+def damped_out(plan: Plan) -> Iterator[str]:
+    """Bodies whose first mode that swings is damped as hardly any structure is, by Rayleigh's numbers or a list; of one
+    ratio for all modes that is told elsewhere."""
+    most = dict[str, float]()
+    for grid in plan.grids:
+        for part in grid.scene.bodies:
+            spec, omega = plan.study.body[part.name], part.modal.omega[part.modal.rigid_modes :][:1]
+            if omega.size and (spec.rayleigh is not None or spec.modal_ratios):
+                whole = part.modal.omega[: part.modal.rigid_modes + 1]
+                ratio = grid.values.damping_rates(part.name, whole)[-1] / (2.0 * omega[0])
+                most[part.name] = max(most.get(part.name, 0.0), float(ratio.max()))
+    for name, ratio in most.items():
+        if ratio > MOST_DAMPING:
+            more = "; a and b exchanged?" if plan.study.body[name].rayleigh is not None else ""
+            yield (
+                f"body.{name}.damping_ratio damps its first mode by {ratio:.3g} of critical: hardly any structure is "
+                f"damped so much, expected at most {MOST_DAMPING:g}, steel 0.005, concrete 0.02{more}"
+            )
+
+
 OF_WAYS_AND_LOADS = (
     unreached,
     stays_level,
@@ -282,4 +313,6 @@ OF_WAYS_AND_LOADS = (
     has_no_band,
     pulsates_together,
     pulls_by_pulsation,
+    loads_nothing,
+    damped_out,
 )
