@@ -27,6 +27,7 @@ declare(
         sensor_unit | sensor | | optional alone str | unit of the sensor
         result | | | axis str | reported number
         result_unit | result | | optional alone str | unit of the result
+            where an archive keeps cells in place of variants
         swept | | | axis str | swept number
         swept_unit | swept | | optional alone str | unit of the swept number
         status_name | | | axis str | status

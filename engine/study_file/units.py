@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
@@ -166,6 +167,9 @@ def _split(text: str, wanted: Unit) -> tuple[str, str]:
         remedy = stiff if "stiffness" in wanted.noun and endless else remedy
         if wanted.noun == "length" and text.strip().isalpha():
             remedy = 'places are numbers: "7.5 m" is the middle of 15 m'
+            with suppress(PydanticCustomError):
+                wanted.si(f"1 {text.strip()}")
+                remedy = f'"1 {text.strip()}"'
         raise fault(f"this text is not {wanted.article}", expected=example, received=shortened(text), remedy=remedy)
     if not match[2]:
         raise fault("a number in quotes has no unit", expected=example, received=shortened(text))

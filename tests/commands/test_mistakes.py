@@ -86,6 +86,9 @@ MISTAKES = {
         SMALL.replace("\nmass = 1.0", '\nmass = "180 kN"'),
         2, ["a force (N) where a mass (kg) is wanted", '"18348.6 kg"', 'kind = "force" is a weight alone'],
     ),
+    "a unit without a number": (
+        SMALL.replace("at = 0.5", 'at = "mm"'), 2, ["sensor.midspan.at", 'received "mm"; remedy: "1 mm"'],
+    ),
     "a place in words": (SMALL.replace("at = 0.5", 'at = "midspan"'), 2, ["sensor.midspan.at", "places are numbers"]),
     "density in g/cm3": (SMALL.replace("= 1000.0", "= 7.85"), 0, ["density = 7.85", '"7.85 g/cm^3"']),
     "length in mm": (SMALL.replace("length = 1.0", "length = 15000"), 0, ["length = 15000 m", '"15000 mm"']),
