@@ -11,11 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from engine.accuracy.choice import usual_pilots
 from engine.accuracy.climb import REFERENCE_PART
 from engine.accuracy.grids import SceneGrid
 from engine.accuracy.groups import PACE
 from engine.accuracy.jobs import Crashed, Halted, Job, Share, over_scenes
+from engine.accuracy.pilots import usual_pilots
 from engine.accuracy.reference import (
     IN_TURN,
     Beyond,

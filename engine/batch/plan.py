@@ -13,11 +13,12 @@ from math import prod
 
 import numpy as np
 
-from engine.accuracy.choice import PILOTS, Choice, Kept, Pilots, choose, find, pilots_of, tolerance_span
+from engine.accuracy.choice import Choice, Kept, Pilots, choose, find, tolerance_span
 from engine.accuracy.grids import KEPT_CYCLE, SceneGrid, unit_steps
 from engine.accuracy.groups import ConvergingGroup, Group, on_rungs
 from engine.accuracy.jobs import NOBODY, Share, Told, untold
 from engine.accuracy.ladder import share_ladder
+from engine.accuracy.pilots import PILOTS, pilots_of
 from engine.accuracy.reference import USUAL_LEVEL, in_full, level_work
 from engine.accuracy.results import results_of
 from engine.kernels.layout import LANES

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from engine.accuracy.choice import PILOTS, pilots_of, scenes_of_pilots, usual_pilots
 from engine.accuracy.groups import ConvergingGroup, Group
 from engine.accuracy.jobs import NOBODY, Job
+from engine.accuracy.pilots import PILOTS, pilots_of, scenes_of_pilots, usual_pilots
 from engine.batch.audit import TABLES, audit_seconds, audited
 from engine.batch.execution import warm_up
 from engine.batch.executors import Place, Shared, in_processes, place

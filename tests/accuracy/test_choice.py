@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.accuracy.choice import (
+from engine.accuracy.choice import NEIGHBOURS, Cheapest
+from engine.accuracy.pilots import (
+    CORNERS,
     FEWEST_PILOTS,
     MOST_SCENES,
-    NEIGHBOURS,
     PILOTS,
-    Cheapest,
     coordinates,
     pilots_of,
     scenes_of_pilots,
@@ -92,6 +92,13 @@ def test_more_variants_have_more_pilots() -> None:
     plan = make_plan(passages(100, 100))
     assert pilots_of(plan.cases, plan.members).size == PILOTS > FEWEST_PILOTS
     assert pilots_of(plan.cases, plan.members, 16).size == 16
+
+
+def test_the_corners_of_a_sweep_are_pilots() -> None:
+    """Beyond the outermost pilots errors were told too small; of so many axes that corners are most pilots none is."""
+    plan = make_plan(passages(100, 100))
+    assert np.isin([0, 99, 9900, 9999], pilots_of(plan.cases, plan.members)).all()
+    assert not np.isin([0, 99, 9900, 9999], pilots_of(plan.cases, plan.members, 4 * CORNERS - 1)).all()
 
 
 def test_distances_know_axes_of_more_than_one_value() -> None:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import engine
-from engine.accuracy.choice import MOST_SCENES, coordinates, pilots_of
 from engine.accuracy.grids import SCALED_FOX_GOODWIN, open_scheme
 from engine.accuracy.ladder import ladder_of
+from engine.accuracy.pilots import MOST_SCENES, coordinates, pilots_of
 from engine.accuracy.results import results_of
 from engine.batch.audit import audit
 from engine.batch.plan import FEW_SCENES, make_plan

@@ -9,8 +9,8 @@ import pytest
 
 import engine
 import studies
-from engine.accuracy.choice import pilots_of
 from engine.accuracy.jobs import InTurn
+from engine.accuracy.pilots import pilots_of
 from engine.batch.chunk import run_chunk
 from engine.batch.plan import make_plan
 from engine.march.tables import SceneTables
