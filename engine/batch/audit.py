@@ -44,6 +44,10 @@ TABLES = 30  # variants at PACE that take as long as the tables of a march: 29 t
 #: Modes x steps at PACE of the tables of all levels, and the work of an audit over that of the references of pilots:
 #: ten audits of 64 took 0.3 to 1.7 times as long as by these two.
 TABLES_OF_AUDITS, FURTHER = 5e8, 5.0
+#: Work of an audit over that of the march beside which it goes a level further, with twice the modes and four times the
+#: steps: of variants of 48 scenes, each by itself, it took 0.4 to 4 times as long as by this, by the levels that most
+#: take 0.2 to 6 times.
+BEYOND = 14.0
 #: Modes x steps over the whole time of a variant, some ten milliseconds, from which on it takes no level more than it
 #: needs to be known.
 DEAR = 1e7
@@ -69,17 +73,17 @@ class Audit(NamedTuple):
         return cls(variants, observed, told, np.full_like(observed, np.nan), len(found) - len(known))
 
 
-def sampled(plan: Plan) -> Counts:
+def sampled(plan: Plan, used: Flat | None = None) -> Counts:
     """The variants to audit, drawn at random by the study alone: where their number is left open 1 % of them, 16 to
-    256, as many as take 30 % of the run's time or 2 s."""
+    256, as many as take 30 % of the run's time or 2 s. used: what all variants took, where that is known."""
     pilots = np.zeros(0, dtype=np.int64) if plan.choice is None else plan.choice.pilots
-    return drawn(plan.size, audited(plan), pilots)
+    return drawn(plan.size, audited(plan, used), pilots)
 
 
-def audited(plan: Plan) -> int:
+def audited(plan: Plan, used: Flat | None = None) -> int:
     """How many variants are audited."""
     wanted = plan.study.solver.audit
-    return audit_size(plan) if wanted == "auto" else min(int(wanted), plan.size)
+    return audit_size(plan, used) if wanted == "auto" else min(int(wanted), plan.size)
 
 
 def drawn(size: int, count: int, but: Counts | tuple[()] = ()) -> Counts:
@@ -88,10 +92,11 @@ def drawn(size: int, count: int, but: Counts | tuple[()] = ()) -> Counts:
     return np.sort(first[~np.isin(first, but)][:count])
 
 
-def audit_size(plan: Plan) -> int:
+def audit_size(plan: Plan, used: Flat | None = None) -> int:
     """How many variants are audited where the study leaves that open."""
     if plan.choice is None:
-        return enough(plan.size, plan.seconds, partial(_seconds, plan, _works_of_some(plan)))
+        works = _works_of_some(plan) if used is None else _works_beyond(plan, used)
+        return enough(plan.size, plan.seconds, partial(_seconds, plan, works))
     # What pilots and their references took, in the mean, is known.
     pilots = usual_pilots(plan.size) * plan.choice.measured.work / plan.choice.pilots.size
     return enough(plan.size, plan.seconds + _units(plan) * pilots / PACE, partial(_by_references, plan))
@@ -134,6 +139,17 @@ def _works_of_some(plan: Plan) -> list[tuple[Array, Counts]]:
     some = plan.grids[:: -(-len(plan.grids) // LOOKED_AT)]
     found = [(grid.scene.ties**1.2, *_works(grid, _dear(plan))) for grid in some]
     return [(len(plan.grids) / len(some) * ties * work, number) for ties, work, number in found]
+
+
+def _works_beyond(plan: Plan, used: Flat) -> list[tuple[Array, Counts]]:
+    """The same by what the variants took."""
+    each = np.nan_to_num(used["modes_used"] * np.asarray(used["steps_used"], dtype=np.float64))
+    every = -(-len(plan.grids) // LOOKED_AT)
+    found = []
+    for grid, members in list(zip(plan.grids, plan.members, strict=True))[::every]:
+        work, number = np.unique(each[members], return_counts=True)
+        found.append((every * BEYOND * grid.scene.ties**1.2 * passages(grid) * work, number))
+    return found
 
 
 def _seconds(plan: Plan, works: Sequence[tuple[Array, Counts]], count: int) -> float:

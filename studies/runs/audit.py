@@ -37,19 +37,26 @@ def audit_group(plan: Plan, dataset: xr.Dataset, work: Work) -> dict[str, xr.Dat
     """
     from engine.batch.audit import may_go_further, sampled
     from engine.batch.execution import choose
-    from engine.march.outcome import USED
 
     choose(plan, work.place, work.stop.event)
-    variants = sampled(plan)
+    used = used_of(plan, dataset)
+    variants = sampled(plan, used)
     kept = ~lost(_flat(plan.cases, dataset["status"])[variants])
-    if plan.study.output.keeps_variants:
-        kept &= may_go_further(plan, variants, {name: _flat(plan.cases, dataset[name])[variants] for name in USED})
+    if used is not None:
+        kept &= may_go_further(plan, variants, {name: own[variants] for name, own in used.items()})
     found = _shared_out(plan, variants[kept], work)
     work.check()
     if not found.variants.size:
         return {}
     left_out = int(np.count_nonzero(~kept)) + found.left_out
     return {GROUP: _group(plan.cases, dataset, found.variants, _of_plan(plan, dataset, found), left_out)}
+
+
+def used_of(plan: Plan, dataset: xr.Dataset) -> dict[str, NDArray[Any]] | None:
+    """What every variant was computed with, by its flat number, where the archive keeps variants."""
+    from engine.march.outcome import USED
+
+    return {name: _flat(plan.cases, dataset[name]) for name in USED} if plan.study.output.keeps_variants else None
 
 
 def audit_group_of_pieces(parts: Pieces, dataset: xr.Dataset, count: int, work: Work) -> dict[str, xr.Dataset]:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from engine.batch.plan import Plan
+    from engine.march.outcome import Flat
     from studies.protocol.parts import Pieces
     from studies.results.results import Results
 
@@ -24,15 +25,16 @@ NONE_OF_THOSE_ASKED = (
 )
 
 
-def why_none(plan: Plan) -> dict[str, str]:
-    """The attribute of an archive of a plan of which no variant was audited; none where the study asks for none."""
+def why_none(plan: Plan, used: Flat | None) -> dict[str, str]:
+    """The attribute of an archive of a plan of which no variant was audited; none where the study asks for none. used:
+    what all variants took, where that is known."""
     from engine.batch.audit import audit_size, sampled
 
     if plan.study.solver.audit == 0:
         return {}
-    if plan.study.solver.audit == "auto" and not audit_size(plan):
+    if plan.study.solver.audit == "auto" and not audit_size(plan, used):
         return {WHY: TOO_LONG}
-    return {WHY: NOTHING_FINER if sampled(plan).size else CHOSE}
+    return {WHY: NOTHING_FINER if sampled(plan, used).size else CHOSE}
 
 
 def why_none_of_pieces(parts: Pieces, count: int) -> dict[str, str]:

@@ -38,7 +38,7 @@ from studies.results.cells import counts_of
 from studies.results.results import Results
 from studies.runs import unreduced
 from studies.runs.archived import with_first_frequency
-from studies.runs.audit import GROUP, audit_group, audit_group_of_pieces
+from studies.runs.audit import GROUP, audit_group, audit_group_of_pieces, used_of
 from studies.runs.identity import check_unchanged, files_of, run_key
 from studies.runs.not_audited import why_none, why_none_of_pieces
 from studies.runs.provenance import attributes
@@ -131,8 +131,9 @@ def _of_variants(parts: Variants, root: xr.Dataset, work: Work) -> Mapping[str, 
 
     plan = parts.plan
     work.listener.stage(AUDITING)
-    audit = audit_group(plan, parts.to_audit(root), work)
-    root.attrs.update({} if audit else why_none(plan))
+    compared = parts.to_audit(root)
+    audit = audit_group(plan, compared, work)
+    root.attrs.update({} if audit else why_none(plan, used_of(plan, compared)))
     models = model_groups(plan.base)
     if plan.study.output.keeps_variants:
         models = with_first_frequency(models, Results(root, plan.study))

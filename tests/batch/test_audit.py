@@ -76,6 +76,15 @@ def test_what_pilots_took_tells_how_many_are_audited() -> None:
     assert audit_size(plan) == 0
 
 
+def test_what_variants_took_tells_how_many_of_those_are_audited_that_converge_by_themselves() -> None:
+    """Foreseen to go two levels on, 180 passages of a second were not audited, as that would take too long."""
+    plan = make_plan(passages(3, 3))
+    assert plan.choice is None
+    steps, modes = 1000 * np.arange(1, 10), np.full(9, 8)
+    sizes = [audit_size(plan, {"modes_used": modes, "steps_used": times * steps}) for times in (1, 20, 10**6)]
+    assert sizes[0] == 9 > sizes[1] > sizes[2] == 0
+
+
 def test_parts_are_joined_to_the_same_audit() -> None:
     plan = run_of("lengths").plan
     picked = np.arange(0, plan.size, 23)

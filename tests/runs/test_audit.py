@@ -273,7 +273,7 @@ def told_of_none(found: Outcome) -> str:
 def test_a_run_of_one_variant_says_that_its_audit_would_take_too_long(tmp_path: Path) -> None:
     """And proposes no more variants than there are."""
     bed = beam(modes=8, damping_ratio=0.02)
-    told = told_of_none(outcome(study(bed, mass(0.2, shuttle(0.2, 0.8, 0.01, 0.1, 3))), tmp_path))
+    told = told_of_none(outcome(study(bed, mass(0.2, shuttle(0.2, 0.8, 0.001, 0.1, 3))), tmp_path))
     assert "no variant was audited: it would have taken too long (audit = 1 audits it all the same)" in told
     assert "no variant was audited, as it would have taken too long (audit = 1 audits it all the same)." in told
     assert "finer" not in told
