@@ -45,8 +45,8 @@ TABLES = 30  # variants at PACE that take as long as the tables of a march: 29 t
 #: ten audits of 64 took 0.3 to 1.7 times as long as by these two.
 TABLES_OF_AUDITS, FURTHER = 5e8, 5.0
 #: Work of an audit over that of the march beside which it goes a level further, with twice the modes and four times the
-#: steps: of variants of 48 scenes, each by itself, it took 0.4 to 4 times as long as by this, by the levels that most
-#: take 0.2 to 6 times.
+#: steps: of variants of 48 scenes, each by itself, eight in ten took 0.3 to 5 times as long as by this, by the levels
+#: that most take 0.2 to 6 times.
 BEYOND = 14.0
 #: Modes x steps over the whole time of a variant, some ten milliseconds, from which on it takes no level more than it
 #: needs to be known.
