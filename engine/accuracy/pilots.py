@@ -18,7 +18,7 @@ PILOTS = 256  # 64 needed 2.7 times the least work for 208 passages at 1e-3, 256
 #: Variants for each pilot, and the fewest pilots: by 128 pilots 2,000 variants took 1.25 times the work that they took
 #: by 256, the pilots half the time; by 96 one of 20 missed its tolerance. One in 16 missed resonances of `double-peak`.
 SHARE_OF_PILOTS, FEWEST_PILOTS = 12, 128
-#: Pilots for each that stands in a corner of the sweep, and how many variants are looked at for these. Without corners
+#: Pilots, at least, for each corner of a sweep, and variants that are looked at for what stands there. Without corners
 #: 1.7 % of the errors of 90 random sweeps at 1e-2 were told too small, 1.3 with them, by as much work or less.
 CORNERS, NEAR_CORNERS = 8, 65536
 LEAST_IN_SCENE = 8  # pilots of a scene, where there are so many: about as many as the neighbours that are asked

@@ -144,11 +144,12 @@ def _works_of_some(plan: Plan) -> list[tuple[Array, Counts]]:
 def _works_beyond(plan: Plan, used: Flat) -> list[tuple[Array, Counts]]:
     """The same by what the variants took."""
     each = np.nan_to_num(used["modes_used"] * np.asarray(used["steps_used"], dtype=np.float64))
-    every = -(-len(plan.grids) // LOOKED_AT)
+    some = list(zip(plan.grids, plan.members, strict=True))[:: -(-len(plan.grids) // LOOKED_AT)]
     found = []
-    for grid, members in list(zip(plan.grids, plan.members, strict=True))[::every]:
+    for grid, members in some:
         work, number = np.unique(each[members], return_counts=True)
-        found.append((every * BEYOND * grid.scene.ties**1.2 * passages(grid) * work, number))
+        times = len(plan.grids) / len(some) * BEYOND * grid.scene.ties**1.2 * passages(grid)
+        found.append((times * work, number))
     return found
 
 

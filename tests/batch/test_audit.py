@@ -77,7 +77,7 @@ def test_what_pilots_took_tells_how_many_are_audited() -> None:
 
 
 def test_what_variants_took_tells_how_many_of_those_are_audited_that_converge_by_themselves() -> None:
-    """Foreseen to go two levels on, 180 passages of a second were not audited, as that would take too long."""
+    """Foreseen to go two levels on, the first `asymmetry` of `init` was not audited, as that would take too long."""
     plan = make_plan(passages(3, 3))
     assert plan.choice is None
     steps, modes = 1000 * np.arange(1, 10), np.full(9, 8)

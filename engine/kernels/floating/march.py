@@ -175,14 +175,14 @@ def next_events(events, who, memory):
 
 @called
 def observe_events(system, lane, who, begun, end, room, statistics):
-    """Some lanes over an event between two times (s), which they have come to, with what is observed on both sides of
-    it in the statistics (signals, STATISTICS, LANES). Squares are integrated by trapezoids; that of the step was to
-    reach from the station before to its end."""
+    """Some lanes over an event that they have come to, with what is observed on both sides of it in the statistics
+    (signals, STATISTICS, LANES). Squares are integrated by trapezoids: from begun (s) to it, and on to the step's end.
+    """
     state, solver, signals, at_event = room.state, room.solver, room.signals, room.at_event
     time, h, near = of(solver.memory, TIME), lanes_at(lane.step, (0,)), near_of(lane)
     at, before, behind = time / h, 0.5 * (time - begun) / h, 0.5 * (end - time) / h
     watched = observe(system, lane, state.now, solver.work, time + near, at_event)
-    count(who, signals, watched, at, -1.0 * behind, statistics)
+    count(who, signals, watched, at, -1.0 * behind, statistics)  # which stood for all up to the end
     count(who & (time > begun + near), at_event, watched, at, before, statistics)
     pass_events(system, lane, who, end, state, solver)
     observe(system, lane, state.now, solver.work, time + near, at_event)
@@ -194,9 +194,8 @@ def observe_events(system, lane, who, begun, end, room, statistics):
 @called
 def go_through(system, lane, scheme, number, room, statistics):
     """All lanes through a step, over the events that come before its end; the part of it that is behind these."""
-    state, solver = room.state, room.solver
-    memory, h, near = solver.memory, lanes_at(lane.step, (0,)), near_of(lane)
-    start, end = (number - 1.0) * h, float(number) * h
+    state, solver, h, near = room.state, room.solver, lanes_at(lane.step, (0,)), near_of(lane)
+    memory, start, end = solver.memory, (number - 1.0) * h, float(number) * h
     if number % (KEPT * (lane.start.shape[1] + 1)) == 0:
         put_lanes(memory, (FRESH,), all_lanes(0.0))
     while not everywhere(of(memory, EVENT) >= end - near):

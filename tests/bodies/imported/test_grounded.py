@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.linalg import eigh
-from scipy.sparse import csc_matrix, save_npz
+from scipy.sparse import csc_matrix, load_npz, save_npz
 
 from engine.batch.plan import make_plan
 from engine.batch.plausibility import remarks
@@ -94,3 +94,14 @@ def test_a_reduced_body_that_stands_on_springs_inside_has_no_weight(loose: Files
     with pytest.raises(BadInput, match=r"bed\.own_weight: by the rigid motions of its nodes its mass is .*on springs"):
         make_plan(study(inside))
     make_plan(study(inside | {"own_weight": False}))
+
+
+def test_a_reduced_body_whose_nodes_move_in_other_directions_has_its_weight(loose: Files, tmp_path: Path) -> None:
+    """Its mass along x and z differs, as not all of its nodes move along x: that says nothing of springs."""
+    table = reduced(loose, tmp_path, *ENDS)
+    lines = Path(table["freedoms"]).read_text(encoding="utf-8").splitlines()
+    kept = [n for n, line in enumerate(lines[1:]) if line != f"{ALONG[6]},x"]
+    for name in ("stiffness", "mass"):
+        save_npz(table[name], csc_matrix(load_npz(table[name]))[kept][:, kept])
+    Path(table["freedoms"]).write_text("\n".join([lines[0], *(lines[n + 1] for n in kept)]), encoding="utf-8")
+    make_plan(study(table))

@@ -11,6 +11,7 @@ from results_schema.errors import BadInput
 from studies.findings.absolute_errors import absolute_errors
 from studies.protocol.study import kind_of
 from studies.results.results import Results
+from tests.engine.build import beam, cruise, force, study
 
 GRAVITY, MASS, LENGTH, INERTIA, STIFFNESS = 9.81, 3.0, 0.8, 0.2, 5e3
 ARM = {"kind": "rigid", "length": LENGTH, "mass": MASS, "inertia": INERTIA, "own_weight": True}
@@ -20,12 +21,12 @@ DRIVEN = {"kind": "revolute", "axis": [0, 1, 0], "motion": {"kind": "steady", "r
 ANGLE, SHIFT = {"body": "arm", "quantity": "joint_angle"}, {"body": "arm", "quantity": "joint_displacement"}
 
 
-def held_by(joints: list[dict[str, Any]], sensor: dict[str, Any], **more: Any) -> Study:
+def held_by(joints: list[dict[str, Any]], sensor: dict[str, Any]) -> Study:
     return Study(
         kind="moving-frames",
         gravity=GRAVITY,
         body={"arm": ARM},
-        frame={"arm": {"joints": joints} | more},
+        frame={"arm": {"joints": joints}},
         sensor={"joint": sensor},
         question={"duration": 2.0},
     )
@@ -69,9 +70,9 @@ def test_one_of_several_joints_by_its_number() -> None:
     ],
 )
 def test_joints_that_are_not_there_are_refused(joints: Any, sensor: Any, words: str) -> None:
-    study = held_by(joints, sensor)
+    given = held_by(joints, sensor)
     with pytest.raises(BadInput, match=words):
-        kind_of(study).parts(study)
+        kind_of(given).parts(given)
 
 
 @pytest.mark.parametrize("sensor", [ANGLE | {"at": 0.5}, {"body": "arm", "at": 0.1, "joint": 0}])
@@ -81,28 +82,6 @@ def test_a_joint_has_no_place(sensor: Any) -> None:
 
 
 def test_where_bodies_stand_there_are_no_joints() -> None:
-    study = Study(
-        kind="passage",
-        body={
-            "beam": {
-                "kind": "beam",
-                "length": 2.0,
-                "area": 1e-3,
-                "second_moment": 1e-7,
-                "youngs_modulus": 7e10,
-                "density": 2700.0,
-                "supports": "pinned-pinned",
-            }
-        },
-        carriage={
-            "load": {
-                "kind": "force",
-                "on": "beam",
-                "force": 1.0,
-                "motion": {"kind": "cruise", "start": 0.0, "end": 2.0, "speed": 1.0},
-            }
-        },
-        sensor={"joint": ANGLE | {"body": "beam"}},
-    )
+    standing = study(beam(), force(1.0, cruise(0.0, 1.0, 1.0)), sensor={"joint": ANGLE | {"body": "bed"}})
     with pytest.raises(BadInput, match="no joints carry an arm"):
-        studies.run(study)
+        studies.run(standing)
