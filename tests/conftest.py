@@ -10,6 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from results_schema.garbage import collect_seldom
+
+collect_seldom()
 for _library in ("OPENBLAS", "OMP", "MKL"):  # before numpy is imported, and for processes that tests start
     os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # as images of containers often set it

@@ -14,6 +14,7 @@ from engine.accuracy.jobs import Halted
 from engine.batch.processes import Found, Raised, send
 from engine.linear_algebra import one_thread
 from results_schema.arrays import Counts
+from results_schema.garbage import collect_seldom
 
 T = TypeVar("T")
 
@@ -22,6 +23,7 @@ def main() -> None:
     """Do jobs as they come through standard input, until that closes; subjects come as their pickled bytes."""
     jobs, found = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever prints
+    collect_seldom()
     subject: Any = None
     with one_thread():
         while True:

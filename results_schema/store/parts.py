@@ -8,7 +8,7 @@ carries the same key.
 import fcntl
 import os
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -77,6 +77,7 @@ class Lock:
 _KEY_FILE = "key"
 _KEY = "run_key"
 _SUFFIX = ".nc"
+_NOBODY = np.empty(0, np.int64)
 
 Part = Mapping[str, Table]
 
@@ -104,6 +105,7 @@ class PartStore:
         self._archive, self._folder = Path(archive), _folder_of(archive)
         self._lock = Lock(Path(f"{archive}.lock"))
         self._look, self._discard = look, discard
+        self._written: dict[Path, np.ndarray] = {}  # by this process, with their variants: whole
 
     def __enter__(self) -> Self:
         self._lock.take()
@@ -151,11 +153,13 @@ class PartStore:
         path = self._folder / (name + _SUFFIX)
         files.write_whole(path, partial(write_tables, tables=tables, filters=PLAIN))
         files.write_sidecar(path)
+        self._written[path] = _variants_of(root)
         return path
 
     def finished(self) -> dict[str, np.ndarray]:
         """The variants of every valid part by name (none in a piece); whatever else lies in the folder is deleted."""
-        found = _valid(self._folder, self.key)
+        others = (path for path in self._folder.glob(f"*{_SUFFIX}") if path not in self._written)
+        found = dict(sorted((_valid(others, self.key) | self._written).items()))
         kept = {self._folder / _KEY_FILE, *found, *map(files.sidecar, found)}
         for path in sorted(self._folder.iterdir()):
             if path not in kept:
@@ -170,6 +174,7 @@ class PartStore:
                 tables = read_tables(path, dataset)
         except ArchiveError as error:
             files.remove_file(path)
+            self._written.pop(path, None)
             what = f"this part cannot be used ({error.what})"
             raise ArchiveError(what, where=str(path), remedy="run again: it is computed again") from error
         own = {key: value for key, value in tables["/"].attributes.items() if key not in (_KEY, CONTENTS, DIGEST)}
@@ -208,7 +213,7 @@ def finished_so_far(archive: Path | str) -> list[np.ndarray] | None:
     Only reads: another run may be at work there.
     """
     folder = _folder_of(archive)
-    return list(_valid(folder, _stored_key(folder)).values()) if folder.is_dir() else None
+    return list(_valid(folder.glob(f"*{_SUFFIX}"), _stored_key(folder)).values()) if folder.is_dir() else None
 
 
 def bytes_so_far(archive: Path | str) -> int:
@@ -224,17 +229,23 @@ def unfinished_study(archive: Path | str) -> str:
     return _stored(_folder_of(archive), 1)
 
 
-def _valid(folder: Path, key: str) -> dict[Path, np.ndarray]:
-    """The parts with their own SHA-256 and this key, and the variants that they hold."""
+def _valid(paths: Iterable[Path], key: str) -> dict[Path, np.ndarray]:
+    """The parts among files with their own SHA-256 and this key, and the variants that they hold."""
     found = {}
-    for path in sorted(folder.glob(f"*{_SUFFIX}")):
+    for path in sorted(paths):
         with suppress(ArchiveError, BadInput):
             if files.sidecar_matches(path):
                 with opened(path) as dataset:
                     if getattr(dataset, _KEY, "") == key:
                         known = dataset.variables.get(VARIANTS)
-                        found[path] = np.empty(0, np.int64) if known is None else np.asarray(known[...])
+                        found[path] = _NOBODY if known is None else np.asarray(known[...])
     return found
+
+
+def _variants_of(root: Table) -> np.ndarray:
+    """The variants that a part's first table names, none in a piece."""
+    known = root.columns.get(VARIANTS)
+    return _NOBODY if known is None else np.asarray(known.data)
 
 
 def _folder_of(archive: Path | str) -> Path:

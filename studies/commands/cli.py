@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from studies.protocol.options import RunOptions
     from studies.runs.runner import Outcome
 
+MAKES_DATASETS = ("check", "run", "report", "info", "compare", "export")
+
 _FOLDER = click.Path(path_type=Path, file_okay=False)
 _FILE = click.Path(path_type=Path)
 _THREADS = click.option("--threads", type=click.IntRange(min=1), metavar="N", help="Threads; default: all cores.")
@@ -317,6 +319,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     def invoke() -> int:
         if arguments is None:
             process.set_up()
+            if command[:1] and command[0] in MAKES_DATASETS:
+                process.leave_dask_out()
         code = commands.main(command, prog_name="wanderlast", standalone_mode=False)
         return code if isinstance(code, int) else 0
 

@@ -9,6 +9,7 @@ import unicodedata
 import warnings
 
 from results_schema.errors import WorkersGaveUp
+from results_schema.garbage import collect_seldom
 from studies.protocol import stopping
 
 # Of addresses, which libraries and stacks of threads take more of than of memory: a study of a beam on two threads
@@ -34,6 +35,7 @@ _LETTERS |= {"ω": "omega", "Ω": "Omega", "φ": "phi"}
 def set_up() -> None:
     """Prepare the process. Raises WorkersGaveUp where it may not have the memory that every command takes."""
     stopping.own_process()
+    collect_seldom()
     # OpenBLAS is told before numpy loads it: the threads are the march's own, and those of OpenBLAS wait for each
     # other longer than a product of small matrices takes.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -49,6 +51,18 @@ def set_up() -> None:
         raise WorkersGaveUp(
             "the limit of memory is too small", expected=expected, received=received, remedy="ulimit -v"
         )
+
+
+def leave_dask_out() -> None:
+    """Let xarray look for dask, as it does at its first index, while there is none: to import it takes a third of a
+    second, and no command meets an array of it."""
+    sys.modules["dask"] = None  # type: ignore[assignment]  # as Python has what is not there
+    try:
+        import xarray as xr
+
+        xr.Variable("x", [0.0]).to_index_variable()
+    finally:
+        del sys.modules["dask"]
 
 
 def _plain_letters(error: UnicodeError) -> tuple[str, int]:

@@ -1,6 +1,7 @@
 """Where in a sweep values are beyond a limit, and the limits of sensors that a table [question] may name."""
 
 from collections.abc import Collection, Mapping
+from functools import reduce
 from typing import Annotated, cast
 
 import numpy as np
@@ -278,9 +279,8 @@ def _along(results: Results, axis: Axis, beyond: Mask, among: Mask | None = None
     """The parts of a swept number in which any variant (among some) is beyond a threshold, and which these are. A part
     ends where the number leaves out more than `GAP` times its usual distance: nothing was computed there."""
     beyond = beyond if among is None else beyond & among
-    along = results.everywhere(results.dataset[axis.name])
-    places = np.unique(along)
-    over = np.isin(places, along[beyond])
+    places = np.unique(axis.values)
+    over = np.isin(places, _values_of(results, axis, beyond))
     if not over.any():
         return "neither way" if axis.sets(DIRECTION) else f"nowhere from {axis.span}"
     steps = _steps(places)
@@ -290,7 +290,7 @@ def _along(results: Results, axis: Axis, beyond: Mask, among: Mask | None = None
     turns = np.flatnonzero(np.diff(over, prepend=False, append=False))
     bounds = np.sort(np.concatenate([turns, apart + 1, apart + 1]))
     parts = [places[first:end] for first, end in zip(bounds[::2], bounds[1::2], strict=True)]
-    beside = [_common(results, axis, beyond & np.isin(along, part)) if among is None else "" for part in parts]
+    beside = [_common(results, axis, beyond & _having(results, axis, part)) if among is None else "" for part in parts]
     end = float(places[-1])
     if len(set(beside)) > 1 and len(parts) <= MOST_APART:
         return listed([f"{_at(axis, [part], end)}{own}" for part, own in zip(parts, beside, strict=True)])
@@ -299,6 +299,17 @@ def _along(results: Results, axis: Axis, beyond: Mask, among: Mask | None = None
         return f"{_at(axis, parts, end)}{whole}"
     first, last = (_at(axis, [part], end) for part in (parts[0], parts[-1]))
     return f"in {len(parts)} parts of the sweep, first {first}, last {last}{whole}"
+
+
+def _values_of(results: Results, axis: Axis, which: Mask) -> Array:
+    """The values of a swept number that some variants have, ascending."""
+    others = tuple(number for number, dim in enumerate(results.dims) if dim != axis.dim)
+    return np.unique(axis.values[which.any(axis=others)])
+
+
+def _having(results: Results, axis: Axis, values: Array) -> Mask:
+    """Which variants have one of some values of a swept number, to be spread over the sweep."""
+    return np.isin(axis.values, values).reshape([-1 if dim == axis.dim else 1 for dim in results.dims])
 
 
 def _steps(places: Array) -> Array:
@@ -331,14 +342,13 @@ def _common(results: Results, along: Axis, which: Mask) -> str:
     """What else is swept and has not all of its values among some variants, in brackets; "not throughout", or "not with
     every" where it has all, where not every combination of these with the values of ``along`` is among them."""
     others = [axis for axis in results.axes if axis.name != along.name and axis.values.size > 1]
-    swept = {axis.name: results.everywhere(results.dataset[axis.name]) for axis in (along, *others)}
-    own = {name: np.unique(values[which]) for name, values in swept.items()}
+    own = {axis.name: _values_of(results, axis, which) for axis in (along, *others)}
     told = [
         f"{axis.noun} {_spans(axis, own[axis.name])}"
         for axis in others
         if own[axis.name].size < np.unique(axis.values).size
     ]
-    among = np.logical_and.reduce([np.isin(values, own[name]) for name, values in swept.items()])
+    among = reduce(np.logical_and, [_having(results, axis, own[axis.name]) for axis in (along, *others)])
     full = not (among & results.with_values & ~which).any()
     if told:
         return f" ({', '.join(told)}{'' if full else ', not throughout'})"
