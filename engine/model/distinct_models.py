@@ -47,8 +47,8 @@ def _timing_of(values: VariantValues, lane: int) -> tuple[dict[str, float], dict
 
 def structure(study: Study, cases: Cases, variants: Counts) -> Counts:
     """(V,) number of the scene that each variant has, by the dimensions that change it, and the modes that it reads."""
-    positions = cases.positions(variants)
     dims = {axis.dim for axis in cases.axes if set(axis.paths) & set(structural(study, cases))}
+    positions = cases.positions(variants) if dims else {}
     code = np.zeros(variants.size, dtype=np.int64)
     for dim, size in zip(cases.dims, cases.shape, strict=True):
         if dim in dims:

@@ -91,9 +91,9 @@ class Cases:
 
     def columns_of(self, indices: ArrayLike) -> dict[str, NDArray[np.float64]]:
         """Swept numbers (V,) of variants given by their flat numbers (V,), by dotted key."""
-        entries: Mapping[str, Any] = dict.fromkeys(self.dims, slice(None))
-        if len(self.dims) != 1 or not np.array_equal(indices, np.arange(self.size)):  # all: no copies
-            entries = self.positions(indices)
+        if np.array_equal(indices, np.arange(self.size)):
+            return {path: self.column(path) for path in self.paths}
+        entries = self.positions(indices)
         return {
             path: np.asarray(column, dtype=np.float64)
             for axis in self.axes
@@ -106,9 +106,10 @@ class Cases:
         if axis is None:
             raise KeyError(path)
         place = self.dims.index(axis.dim)
-        shape = [1] * place + [-1] + [1] * (len(self.dims) - place - 1)
-        values = axis.columns(slice(None))[path].astype(np.float64)
-        return np.broadcast_to(values.reshape(shape), self.shape).reshape(-1)
+        values: NDArray[np.float64] = axis.columns(slice(None))[path].astype(np.float64)
+        if len(self.dims) > 1:
+            values = np.tile(np.repeat(values, prod(self.shape[place + 1 :])), prod(self.shape[:place]))
+        return values
 
     def values_of(self, index: int) -> dict[str, int | float]:
         """Swept numbers of one variant by dotted key; integers stay integers."""
