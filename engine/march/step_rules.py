@@ -243,8 +243,9 @@ def _contact_square(model: SceneModel, values: VariantValues, spring: SpringTie)
     mobility = float(np.max(np.sum(body.shape(np.linspace(0.0, body.length, TRACK_PLACES)) ** 2, axis=1)))
     stiffness = values.column(spring.keys.stiffness)
     if spring.held is not None:
-        own = spring.held.fixed_row(model.bodies[spring.held.body].modal)
-        return np.asarray(stiffness * (float(np.sum(own**2)) + mobility))
+        held = model.bodies[spring.held.body]
+        above = spring.held.fixed_row(held.modal) ** 2 @ values.mobility(held.name, held.modal.omega.size)
+        return np.asarray(stiffness * (above + mobility))
     contact = mobility / (1.0 + values.touching_mass(model.carriages[spring.carriage].name) * mobility)
     return np.asarray(stiffness * (1.0 / values.column(spring.keys.mass) + contact))
 

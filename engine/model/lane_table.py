@@ -26,7 +26,10 @@ RESIDUAL_DAMPING = 0.2
 def moving_mass(model: SceneModel, values: VariantValues, carriage: int) -> Array:
     """(V,) kg of a whole carriage."""
     tie = model.carriages[carriage]
-    return values.own_mass(tie.name) + tie.own_mass
+    if tie.rides is None:
+        return values.own_mass(tie.name)
+    brought = model.bodies[tie.rides]
+    return values.own_mass(tie.name) + values.columns.get(f"body.{brought.name}.mass", brought.modal.mass)
 
 
 def weight(model: SceneModel, values: VariantValues, carriage: int) -> Array:
@@ -68,7 +71,8 @@ class LaneTable:
     """Numbers of whole blocks of variants of one scene, in SI units.
 
     omega (N, 1), or (blocks, N, LANES) where forces pulsate;  rates (blocks, N, LANES): 2 zeta omega;
-    inverse_modal_mass (blocks, N, LANES): 1, 1/m (1/kg) of sprung masses, and 0 of what nothing moves;  mass, weight
+    inverse_modal_mass (blocks, N, LANES): 1 over the masses of bodies' modes, which are mostly 1, 1/m (1/kg) of sprung
+    masses, and 0 of what nothing moves;  mass, weight
     (blocks, ties, LANES): of the carriages, zero for dampers and springs, mass only what touches the body and has
     inertia;  joint (blocks, ties, LANES): 1 for rigid joints;  damper, spring (blocks, ties, LANES): N s/m and N/m,
     zero for carriages;  pulse (blocks, ties, LANES): N, amplitudes of forces that pulsate;  phase (blocks, P,
@@ -158,8 +162,11 @@ def _frequencies(model: SceneModel, values: VariantValues) -> Array:
 
 
 def _inverse_modal_mass(model: SceneModel, values: VariantValues) -> Array:
-    """(N, V) 1, 1/m of sprung masses, and 0 of what forces that pulsate swing by: nothing moves their coordinates."""
+    """(N, V) 1 over the masses of bodies' modes, 1/m of sprung masses, and 0 of what forces that pulsate swing by:
+    nothing moves their coordinates."""
     found = np.ones((model.omega.size, values.size))
+    for part in model.bodies:
+        found[part.modes] = values.mobility(part.name, part.modal.omega.size)
     for spring in model.sprung:
         found[spring.mode] = 1.0 / values.column(spring.keys.mass)
     found[model.pulses] = 0.0

@@ -72,7 +72,7 @@ def stand(study: Study, numerics: Numerics, place: Place, swept: Collection[str]
         springs.append(SpringTie(place.number, load.rider, load.body, keys, held, None, damped, contact.is_rigid))
     acting = tuple(springs) if numerics.knows_springs else ()
     reference = carriage.reference_on(modal.length)
-    carried = replace(place.tie, loads=loads, rides=place.rides, own_mass=modal.mass, reference=reference)
+    carried = replace(place.tie, loads=loads, rides=place.rides, reference=reference)
     return SupportReactions(carried, riders, acting)
 
 

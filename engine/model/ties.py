@@ -56,7 +56,7 @@ class CarriageTie:
     act at its contact.
 
     loads: what carries its weight on level ground: itself but for a body on its contacts.
-    rides: number of the body that rides, with its mass (kg) and the place of its own track that the motion moves (m).
+    rides: number of the body that rides, with the place of its own track that the motion moves (m).
     pulse: what its force swings in time by, a name that it shares with those that swing in step with it; "" of others.
     """
 
@@ -66,7 +66,6 @@ class CarriageTie:
     inertia: Inertia
     loads: tuple[Load, ...]
     rides: int | None = None
-    own_mass: float = 0.0
     reference: float = 0.0
     pulse: str = ""
 

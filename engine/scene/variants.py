@@ -1,7 +1,8 @@
 """What differs from variant to variant: columns of numbers for the models below, which know no dotted key.
 
 Mass, force, pace, damping and gravity may differ within one scene, and so may what changes the units of time and force
-alone (`engine.scene.similarity`); every other swept number changes the scene itself, and the plan groups by it.
+alone (`engine.scene.similarity`) and the masses of rigid bodies that ride on springs; every other swept number changes
+the scene itself, and the plan groups by it.
 """
 
 from __future__ import annotations
@@ -85,12 +86,24 @@ def in_use(study: Study, body: str) -> bool:
     return body in (*moving, *read)
 
 
+def modal_mass_keys(study: Study) -> dict[str, tuple[str, ...]]:
+    """By the bodies that ride on springs alone, the keys of the masses of their modes, where one number is each: such
+    modes keep their shapes, and every lane has masses of its own."""
+    found = dict[str, tuple[str, ...]]()
+    for carriage in study.carriage.values():
+        if carriage.riding_body is not None and not any(one.is_rigid for one in carriage.riding_contacts.values()):
+            keys = tuple(f"body.{carriage.riding_body}.{key}" for key in study.body[carriage.riding_body].modal_masses)
+            if all(study.value(key) > 0.0 for key in keys):
+                found[carriage.riding_body] = keys
+    return found
+
+
 def structural(study: Study, cases: Cases) -> list[str]:
     """Swept keys that change the scene itself."""
     motions = {f"carriage.{name}.motion.": carriage.motion for name, carriage in study.carriage.items()}
     fixed = {f"{here}{key}" for here, motion in motions.items() for key in ("speed", "frequency") if key != motion.pace}
-    units = UnitKeys.of(study).set_by(axis.paths for axis in cases.axes)
-    return [path for path in cases.paths if path in fixed or not (LANE_KEYS.fullmatch(path) or path in units)]
+    own = UnitKeys.of(study).set_by(axis.paths for axis in cases.axes).union(*modal_mass_keys(study).values())
+    return [path for path in cases.paths if path in fixed or not (LANE_KEYS.fullmatch(path) or path in own)]
 
 
 def sweeps_numerics(cases: Cases) -> bool:
@@ -233,6 +246,14 @@ class VariantValues:
         stands = (motion.rests_from == 0.0) & (self.start_time(name) == 0.0)
         together = stands & (own * motion.duration <= first * clock.duration)
         return np.where(together, motion.duration / clock.duration, rounded(first / own))
+
+    def mobility(self, body: str, modes: int) -> Array:
+        """(N, V) 1 over the modal masses of a body's modes, which are 1 but where variants have masses of their own."""
+        found = np.ones((modes, self.size))
+        for mode, key in enumerate(modal_mass_keys(self.study).get(body, ())):
+            if key in self.columns:
+                found[mode] = float(self.study.value(key)) / self.columns[key]
+        return found
 
     def own_mass(self, carriage: str) -> Array:
         """(V,) kg of a carriage by its own keys."""

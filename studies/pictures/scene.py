@@ -10,6 +10,8 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from engine.bodies.modal.outline import Elastic, Held
+from engine.model.lane_table import moving_mass
+from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
 from studies.pictures.common.figures import BLUE, GREEN, INK, MUTED, ORANGE, PURPLE, SKY, VERMILION, WIDTH, Figure, draw
 from studies.pictures.moving_shapes import FRONT, PLAN, SIDE, SPACE, view_of
@@ -366,10 +368,11 @@ def _labels(scene: Layout, view: Array, u: float) -> list[Label]:
         found.append(Label(view @ at, body.part.name, colour, above=True))
         for lump in body.outline.masses:
             found.append(Label(view @ body.at(lump.place), f"{lump.name} ({number(lump.mass)} kg)", INK))
-    ties, shown = {tie.name: tie for tie in scene.model.carriages}, list(scene.positions)
+    shown, alone = list(scene.positions), VariantValues(study, {}, 1)
+    numbers = {tie.name: number for number, tie in enumerate(scene.model.carriages)}
     for name in shown if len(shown) <= MOST_NAMED else shown[:: len(shown) - 1]:
         carriage = study.carriage[name]
-        mass = carriage.moving_mass + ties[name].own_mass
+        mass = float(moving_mass(scene.model, alone, numbers[name])[0])
         load = f"{number(mass)} kg" if mass > 0.0 else quantity(carriage.sum_of(carriage.forces), "N")
         found.append(Label(view @ (scene.touched(name) + u * UP), f"{name} ({load})", VERMILION, above=True))
     for name, sensor in study.sensor.items():

@@ -122,6 +122,11 @@ class Body(SpecOfKind):
         return Growing()
 
     @property
+    def modal_masses(self) -> tuple[str, ...]:
+        """Keys of what moves in each of its modes, where one number tells that and their shapes depend on no other."""
+        return ()
+
+    @property
     def may_be_nothing(self) -> tuple[str, ...]:
         """Keys of its mass and its inertia, where these may be 0 in a frame that moves."""
         return ()

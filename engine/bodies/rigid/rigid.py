@@ -44,6 +44,10 @@ class Rigid(Body):
         return OF_SECTION
 
     @property
+    def modal_masses(self) -> tuple[str, ...]:
+        return ("mass", "inertia")
+
+    @property
     def may_be_nothing(self) -> tuple[str, ...]:
         return ("mass", "inertia")
 

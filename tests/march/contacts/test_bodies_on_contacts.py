@@ -44,6 +44,7 @@ def histories(case: Study) -> tuple[dict[str, Array], Twin, tuple[Array, Array, 
     return {n: found[:, names.index(n)] for n in names}, twin, marched, np.array(inner)
 
 
+OTHER_MASSES = {"mass": [0.2, 0.5, 1.1], "inertia": [0.004, 0.03]}
 PLAIN: Table = {"steps": 200, "static_correction": False}
 SCENES: dict[str, Callable[[], Study]] = {
     "rigid, passing": lambda: riding(cruise(0.3, 0.7, 0.8)),
@@ -93,6 +94,40 @@ def test_lanes_agree_with_single_variants() -> None:
     alone = engine.run(case.without_sweep().with_values(values | {"carriage.car.contacts.front.stiffness": 900.0}))
     for name in ("rear_max", "tip_min", "place_max"):
         assert float(found[name]) == pytest.approx(float(alone[name]), rel=1e-12)
+
+
+WAY = cruise(0.3, 0.6, 0.8)
+TROLLEY = {"on": "table", "kind": "mass", "mass": 0.2, "motion": cruise(0.02, 0.38, 0.4)}
+CARRYING = {"car": {"on": "bed", "kind": "body", "body": "table", "contacts": TWO, "motion": WAY}, "trolley": TROLLEY}
+MASSES: dict[str, Callable[[Table], Study]] = {
+    "a table, standing still at first": lambda sweep: riding(
+        shuttle(0.3, 0.7, 0.8, 0.1, 1), initial="equilibrium", sweep=sweep
+    ),
+    "uneven, over both ends": lambda sweep: riding(cruise(-0.4, 1.4, 0.8), table=UNEVEN, sweep=sweep),
+    "with a trolley on it": lambda sweep: riding(WAY, carriage=CARRYING, sweep=sweep),
+}
+
+
+@pytest.mark.parametrize("name", MASSES)
+def test_rigid_bodies_of_other_masses_share_a_scene(name: str) -> None:
+    """Heave and pitch keep their shapes: every lane has masses of its own, as each would have in a scene of its own."""
+    swept = {key: {"of": f"body.table.{key}", "values": values} for key, values in OTHER_MASSES.items()}
+    case = MASSES[name](swept)
+    assert len(make_plan(case).grids) == 1
+    found = engine.run(case)
+    for place in np.ndindex(3, 2):
+        own = {f"body.table.{key}": OTHER_MASSES[key][number] for key, number in zip(OTHER_MASSES, place, strict=True)}
+        alone = engine.run(case.without_sweep().with_values(own))
+        for result in ("tip_max", "tip_acceleration_min", "place_rms", "rear_max", "total_min", "place_static"):
+            known = float(alone[result])
+            assert float(found[result][place]) == pytest.approx(known, rel=1e-10), (result, place)
+
+
+def test_rigid_bodies_on_rigid_contacts_have_scenes_of_their_own() -> None:
+    """What meets a joint at time 0 is shared out by masses."""
+    one = {"only": {"at": 0.2, "stiffness": "rigid"}}
+    swept = {"mass": {"of": "body.table.mass", "values": OTHER_MASSES["mass"]}}
+    assert len(make_plan(riding(shuttle(0.3, 0.7, 0.8, 0.1, 1), one, sweep=swept)).grids) == 3
 
 
 def test_frequencies_of_contacts_on_their_springs() -> None:
