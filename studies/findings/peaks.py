@@ -115,10 +115,13 @@ def _vertices(phase: Array, lanes: Array, at: Counts, lane: Counts) -> tuple[Arr
     """(P,) values and phases of maxima between stations, given the highest station of each: the vertices of parabolas
     through it and its neighbours, or where the lines on both sides of a kink meet."""
     _, _, bend = _slopes(phase, lanes, at, lane, np.ones_like(at))
-    side = np.where(bend[0] < bend[2], -1, 1)  # a kink bends the stations on both its sides
+    side = np.where(bend[1] < bend[3], -1, 1)  # a kink bends the stations on both its sides
     gap, slope, bend = _slopes(phase, lanes, at, lane, side)
     width = 0.5 * (gap[1:] + gap[:-1])
-    smooth = (np.abs(bend[0] / width[0]) + np.abs(bend[3] / width[3])) * 0.5 * (width[1] + width[2])
+    # Of waves of six stations those two beside a peak do not bend, but the next ones do.
+    rate = np.abs(bend / width)
+    smooth = np.maximum(rate[1] + rate[4], rate[0] + rate[5]) * 0.5 * (width[2] + width[3])
+    gap, slope, bend, width = gap[1:6], slope[1:6], bend[1:5], width[1:5]
     sharp = (slope[3] < 0.0) & (bend[2] <= 0.0) & (bend[1] + bend[2] < -KINK * smooth)
     with np.errstate(divide="ignore", invalid="ignore"):
         meet = gap[2] * (slope[2] - slope[3]) / (slope[1] - slope[3])
@@ -130,9 +133,9 @@ def _vertices(phase: Array, lanes: Array, at: Counts, lane: Counts) -> tuple[Arr
 
 
 def _slopes(phase: Array, lanes: Array, at: Counts, lane: Counts, side: Counts) -> tuple[Array, Array, Array]:
-    """Of two intervals before and three after each of P stations, seen in the direction ``side``: lengths and slopes
-    (5, P), and the changes of slopes from one to the next (4, P). None goes from the cycle's end to its beginning."""
-    first = (at + side * np.arange(-2, 3)[:, None] - (side < 0)) % (len(lanes) - 1)
+    """Of three intervals before and four after each of P stations, seen in the direction ``side``: lengths and slopes
+    (7, P), and the changes of slopes from one to the next (6, P). None goes from the cycle's end to its beginning."""
+    first = (at + side * np.arange(-3, 4)[:, None] - (side < 0)) % (len(lanes) - 1)
     gap = phase[first + 1] - phase[first]
     slope = side * (lanes[first + 1, lane] - lanes[first, lane]) / gap
     return gap, slope, np.diff(slope, axis=0)

@@ -82,6 +82,14 @@ def test_a_kink_between_stations_is_found(at: float, left: float) -> None:
     assert errors[0] < 2e-5 and errors[1] < 2e-6
 
 
+@pytest.mark.parametrize("waves_per_cycle", [3, 5, 8, 10])
+def test_waves_of_few_stations_have_no_kinks(waves_per_cycle: int) -> None:
+    """Of 5 to 16 stations each: a parabola is off by little, where the lines of a kink would rise a third beyond."""
+    phase, shift = np.linspace(0.0, 1.0, 49), 2 * np.pi * np.linspace(0.0, 1.0, 9)
+    found = peaks(phase, np.sin(2 * np.pi * waves_per_cycle * phase[:, None] + shift))
+    assert 0.9 < np.nanmin(found.value) and np.nanmax(found.value) < 1.02
+
+
 @pytest.mark.parametrize(("height", "count"), [(0.019, 1), (0.021, 2)])
 def test_a_bump_counts_from_two_percent_of_the_range_on(height: float, count: int) -> None:
     """A triangle from 0 to 1 with a bump on its falling side."""
