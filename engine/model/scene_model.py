@@ -95,11 +95,12 @@ class SceneModel:
     @cached_property
     def corrected(self) -> Counts:
         """Numbers of the ties that a residual coordinate moves (`attachment.residual_rows`): masses, and their pushes
-        along and across their tracks."""
+        along and across their tracks, on bodies that bend."""
         if not self.numerics.static_correction:
             return np.zeros(0, dtype=np.int64)
         masses = [r for r, carriage in enumerate(self.carriages) if carriage.inertia == "mass"]
-        return np.array([*masses, *range(self.first_push, self.ties)], dtype=np.int64)
+        ties = [*masses, *range(self.first_push, self.ties)]
+        return np.array([r for r in ties if self.bodies[self.attachments[r][0].body].modal.omega.any()], dtype=np.int64)
 
     @property
     def corrected_bodies(self) -> list[int]:

@@ -77,6 +77,20 @@ def test_a_rigid_table_on_a_rigid_bed_stands_on_its_springs() -> None:
     assert found == pytest.approx(expected, rel=1e-5)
 
 
+def test_a_mass_that_stands_on_a_rigid_table_is_part_of_it() -> None:
+    """For tables of two masses, as lanes of one scene."""
+    way = cruise(0.3, 0.7, 1.0)
+    head = {"on": "table", "kind": "mass", "mass": 0.2, "motion": {"kind": "standing", "at": 0.3}}
+    car = {"on": "bed", "kind": "body", "body": "table", "contacts": TWO, "motion": way}
+    masses = [0.5, 1.3]
+    found = frequencies(riding(way, carriage={"car": car, "head": head}), [0.4, 0.5], 5, body__table__mass=masses)
+    for lane, own in enumerate(masses):
+        centre = (0.2 * own + 0.3 * 0.2) / (own + 0.2)
+        inertia = RIGID["inertia"] + own * (centre - 0.2) ** 2 + 0.2 * (centre - 0.3) ** 2
+        both = RIGID | {"mass": own + 0.2, "inertia": inertia, "centre": centre}
+        assert found[lane] == pytest.approx(frequencies(riding(way, TWO, both), [0.4, 0.5], 5)[0], rel=1e-9)
+
+
 def test_on_one_rigid_joint_a_table_is_a_mass() -> None:
     """Its free pitch, which nothing resists, is left out."""
     one = {"only": {"at": 0.2, "stiffness": "rigid"}}
