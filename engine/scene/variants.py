@@ -1,8 +1,8 @@
 """What differs from variant to variant: columns of numbers for the models below, which know no dotted key.
 
 Mass, force, pace, damping and gravity may differ within one scene, and so may what changes the units of time and force
-alone (`engine.scene.similarity`) and the masses of rigid bodies that ride on springs; every other swept number changes
-the scene itself, and the plan groups by it.
+alone (`engine.scene.similarity`) and the masses of rigid bodies that ride; every other swept number changes the scene
+itself, and the plan groups by it.
 """
 
 from __future__ import annotations
@@ -87,11 +87,13 @@ def in_use(study: Study, body: str) -> bool:
 
 
 def modal_mass_keys(study: Study) -> dict[str, tuple[str, ...]]:
-    """By the bodies that ride on springs alone, the keys of the masses of their modes, where one number is each: such
-    modes keep their shapes, and every lane has masses of its own."""
+    """By the bodies that ride, the keys of the masses of their modes, where one number is each: such modes keep their
+    shapes, and every lane has masses of its own. Not on one rigid contact: how it sets them moving is shared out by
+    masses, where two or more leave no choice."""
     found = dict[str, tuple[str, ...]]()
     for carriage in study.carriage.values():
-        if carriage.riding_body is not None and not any(one.is_rigid for one in carriage.riding_contacts.values()):
+        joints = sum(contact.is_rigid for contact in carriage.riding_contacts.values())
+        if carriage.riding_body is not None and joints != 1:
             keys = tuple(f"body.{carriage.riding_body}.{key}" for key in study.body[carriage.riding_body].modal_masses)
             if all(study.value(key) > 0.0 for key in keys):
                 found[carriage.riding_body] = keys

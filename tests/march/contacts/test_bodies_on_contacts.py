@@ -97,6 +97,7 @@ def test_lanes_agree_with_single_variants() -> None:
 
 
 WAY = cruise(0.3, 0.6, 0.8)
+JOINTS = {name: {"at": at, "stiffness": "rigid"} for name, at in (("rear", 0.05), ("front", 0.35))}
 TROLLEY = {"on": "table", "kind": "mass", "mass": 0.2, "motion": cruise(0.02, 0.38, 0.4)}
 CARRYING = {"car": {"on": "bed", "kind": "body", "body": "table", "contacts": TWO, "motion": WAY}, "trolley": TROLLEY}
 MASSES: dict[str, Callable[[Table], Study]] = {
@@ -104,6 +105,9 @@ MASSES: dict[str, Callable[[Table], Study]] = {
         shuttle(0.3, 0.7, 0.8, 0.1, 1), initial="equilibrium", sweep=sweep
     ),
     "uneven, over both ends": lambda sweep: riding(cruise(-0.4, 1.4, 0.8), table=UNEVEN, sweep=sweep),
+    "on rigid contacts, on a bed that sags": lambda sweep: riding(
+        shuttle(0.3, 0.7, 0.8, 0.3, 1), JOINTS, bed=beam(own_weight=True, modes=5), sweep=sweep
+    ),
     "with a trolley on it": lambda sweep: riding(WAY, carriage=CARRYING, sweep=sweep),
 }
 
@@ -123,8 +127,8 @@ def test_rigid_bodies_of_other_masses_share_a_scene(name: str) -> None:
             assert float(found[result][place]) == pytest.approx(known, rel=1e-10), (result, place)
 
 
-def test_rigid_bodies_on_rigid_contacts_have_scenes_of_their_own() -> None:
-    """What meets a joint at time 0 is shared out by masses."""
+def test_rigid_bodies_on_one_rigid_contact_have_scenes_of_their_own() -> None:
+    """How that sets them moving at time 0 is shared out by masses."""
     one = {"only": {"at": 0.2, "stiffness": "rigid"}}
     swept = {"mass": {"of": "body.table.mass", "values": OTHER_MASSES["mass"]}}
     assert len(make_plan(riding(shuttle(0.3, 0.7, 0.8, 0.1, 1), one, sweep=swept)).grids) == 3
