@@ -254,7 +254,7 @@ class Frame(Spec):
 def inertia_checks(frames: Mapping[str, Frame], bodies: Mapping[str, Body]) -> Iterator[Check]:
     """That what moves freely has a mass, and an inertia of its own where it turns, and what has no frame both."""
     for name, body in bodies.items():
-        keys = [f"body.{name}.{key}" for key in body.may_be_nothing]
+        keys = [f"body.{name}.{key}" for key in body.modal_masses]
         if name not in frames:
             for key in keys:
                 yield Check(
@@ -264,7 +264,7 @@ def inertia_checks(frames: Mapping[str, Frame], bodies: Mapping[str, Body]) -> I
         loose = [joint for joint in frames[name].joints if not joint.is_driven]
         held = "> 0, or a joint with a motion, or none"
         carried = [other for other in bodies if other in frames and name in (other, *_holders(frames, other))]
-        masses = [f"body.{other}.mass" for other in carried if bodies[other].may_be_nothing]
+        masses = [f"body.{other}.mass" for other in carried if bodies[other].modal_masses]
         if keys and any(joint.slides for joint in loose) and len(masses) == len(carried):
             yield Check(keys[0], tuple(masses), _some, "this joint moves nothing that has a mass", held)
         if keys and any(joint.turns for joint in loose) and frames[name].inertia is None:

@@ -57,7 +57,7 @@ def test_what_moves_freely_has_inertia(joint: str, nothing: dict[str, float], ke
     pattern = rf"body\.payload\.{key}: {words}; expected > 0, or a joint with a motion, or none"
     with pytest.raises(BadInput, match=pattern):
         swinging(PAYLOAD | nothing, joints)
-    assert swinging(PAYLOAD, joints).body["payload"].may_be_nothing == ("mass", "inertia")
+    assert swinging(PAYLOAD, joints).body["payload"].modal_masses == ("mass", "inertia")
     driven = [
         {"kind": "prismatic", "axis": [0, 0, 1], "motion": {"kind": "waypoints", "times": [0, 1], "values": [0, 1]}}
     ]

@@ -48,10 +48,6 @@ class Rigid(Body):
         return ("mass", "inertia")
 
     @property
-    def may_be_nothing(self) -> tuple[str, ...]:
-        return ("mass", "inertia")
-
-    @property
     def centre_of_mass(self) -> float:
         """m along its track."""
         return 0.5 * self.length if self.centre is None else self.centre
