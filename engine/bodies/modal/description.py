@@ -123,8 +123,8 @@ class Body(SpecOfKind):
 
     @property
     def modal_masses(self) -> tuple[str, ...]:
-        """Keys of its mass and its inertia, where each of its modes moves one of them alone and has a shape that depends
-        on neither; they may be 0 in a frame that moves."""
+        """Keys of its mass and its inertia, where each of its modes moves one of them alone and has a shape that is
+        of neither; they may be 0 in a frame that moves."""
         return ()
 
     @property
