@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 LIFTS = 1e-9  # of its weight: a contact that pulls more at rest would lift
 CLASH = 1e-7  # of a shape, per contact: rigid contacts that the modes cannot tell apart any better are one
+UNMOVED = 1e-12  # of the largest motion of contacts, below which one is rounding: a frame goes along its track, too
 HELD = 1e-6  # part of a body's mass that its elastic modes may take of a uniform acceleration
 
 
@@ -102,10 +103,11 @@ def _shares(study: Study, numerics: Numerics, name: str, modal: ModalBody) -> tu
         soft = _flexibility(modal, places)
     soft = soft + np.diag([1.0 / contact.spring for contact in contacts])
     unit = max(float(np.trace(soft)), 1e-30)
-    free = shapes[:, rigid] / np.abs(shapes[:, rigid]).max()
-    count = len(places)
+    sizes = np.abs(shapes[:, rigid]).max(axis=0)  # of each motion its own: what turns easily heaves all the same
+    sizes = np.where(sizes > UNMOVED * sizes.max(), sizes, sizes.max())
+    free, count = shapes[:, rigid] / sizes, len(places)
     matrix = np.block([[soft / unit, -free], [free.T, np.zeros((free.shape[1],) * 2)]])
-    wanted = np.concatenate([np.zeros(count), pull[rigid] / np.abs(shapes[:, rigid]).max()])
+    wanted = np.concatenate([np.zeros(count), pull[rigid] / sizes])
     found = np.linalg.lstsq(matrix, wanted, rcond=1e-12)[0]
     _check_stands(study, name, (free, wanted[count:]), found[:count])
     return tuple(float(share) for share in found[:count])

@@ -153,6 +153,7 @@ def expand(study: Study) -> Cases:
         dim = VARIANT if name in joint else name
         own = listed if axis.values is not None else ranged
         values = sampled_values[name] if name in sampled_values else own(study, name, axis)
+        _check_dimension(study, name, axis.of)
         unit = study.unit(axis.of[0])
         targets = {target: factor for path in axis.of for target, factor in study.targets(path).items()}
         symbol, noun = (unit.symbol, unit.noun) if unit else ("", "")
@@ -231,6 +232,15 @@ def _check_paths(study: Study) -> None:
                 what = "this number is set twice"
                 raise study.source.fault(f"sweep.{name}.of", what, received=f"{path}, also by {owners[clash]}")
             owners[target] = name
+
+
+def _check_dimension(study: Study, name: str, paths: Sequence[str]) -> None:
+    """What one axis sets has one dimension."""
+    units = [study.unit(path) for path in paths]
+    if len({unit.symbol if unit else "" for unit in units}) > 1:
+        told = [f"{path} ({unit.noun if unit else 'a count'})" for path, unit in zip(paths, units, strict=True)]
+        what, remedy = "one value for numbers of several dimensions", "an axis for each; zip = true pairs them"
+        raise study.source.fault(f"sweep.{name}.of", what, received=", ".join(told), remedy=remedy)
 
 
 def _check_repeats(study: Study, cases: Cases) -> None:

@@ -191,6 +191,7 @@ def test_sobol_is_joint_and_repeatable() -> None:
         (axis("a", "schema_version", "values = [1]"), ["sweep.a.of", "not part of the model"]),
         (axis("a", "sweep.a.values.0", "values = [1]"), ["sweep.a.of", "not part of the model"]),
         (f'a = {{ of = ["{MASS}", "gravity"], values = ["1 kg"] }}', ["sweep.a.values.0", "gravity", "a mass"]),
+        (f'a = {{ of = ["{MASS}", "gravity"], values = [1] }}', ["sweep.a.of", "several dimensions", "gravity"]),
         ("\n".join([axis("a", MASS, "values = [1]"), axis("b", MASS, "values = [2]")]), ["sweep.b.of", "twice"]),
         (
             "\n".join(["zip = true", axis("a", MASS, "values = [1]"), axis("b", SPEED, "values = [1, 2]")]),

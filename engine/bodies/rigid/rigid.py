@@ -11,14 +11,14 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from engine.bodies.modal.description import Body
 from engine.bodies.modal.modal_body import Array, ModalBody
 from engine.bodies.modal.outline import ALONG, DOWN, Line, Lump, Outline, straight
 from engine.bodies.modal.section_doubts import Doubt
 from engine.study_file.checks import Check, on_body
-from engine.study_file.units import Inertia, Length, Mass, unit_of
+from engine.study_file.units import Inertia, Length, Mass, fault, unit_of
 from results_schema.errors import BadInput
 from results_schema.quantities import OF_SECTION
 
@@ -38,6 +38,13 @@ class Rigid(Body):
     mass: Mass = Field(ge=0)
     inertia: Inertia = Field(ge=0)
     centre: Length | None = None
+
+    @model_validator(mode="after")
+    def _bends_nowhere(self) -> Rigid:
+        if self.damping_ratio != 0.0 or self.modes != "auto":
+            what, remedy = "a rigid body has no modes that bend", "damping of what it stands on, or of its joints"
+            raise fault(what, expected="neither damping_ratio nor modes", remedy=remedy)
+        return self
 
     @property
     def untold(self) -> tuple[str, ...]:

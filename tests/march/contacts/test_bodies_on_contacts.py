@@ -233,6 +233,16 @@ def test_a_rigid_contact_stays_on_the_track() -> None:
         assert gap.max() < 1e-4 * np.abs(found.below.values).max()
 
 
+def test_what_turns_easily_stands_all_the_same() -> None:
+    """Shares of the weight follow from places and springs alone, however small the inertia."""
+    changes: Table = {"solver": {"steps": 300, "fidelity": "force"}}
+    shares = [
+        float(engine.run(riding(cruise(0.3, 0.7, 0.8), table=UNEVEN | {"inertia": inertia}, **changes)).rear_static)
+        for inertia in (0.01, 1e-9)
+    ]
+    assert shares[1] == pytest.approx(shares[0], rel=1e-9)
+
+
 def test_its_weight_alone() -> None:
     """fidelity = "force": the shares of level ground as moving forces."""
     changes: Table = {"sensor": {"place": fixed(0.61)}, "solver": {"steps": 300, "fidelity": "force"}}
@@ -304,6 +314,8 @@ WHOLE = riding(shuttle(0.3, 0.7, 0.8, 0.1, 2))
         ("carriage.car.motion.end", 0.9, r"contacts\.front: this contact leaves the body"),
         ("carriage.car.reference", 0.6, r"carriage\.car\.reference: a place off the track"),
         ("solver.fidelity", "mass", r"solver\.fidelity: .*has no meaning"),
+        ("body.table.damping_ratio", 0.02, r"body\.table: a rigid body has no modes that bend"),
+        ("body.table.modes", 3, r"body\.table: a rigid body has no modes that bend"),
         ("body.table.own_weight", True, r"nothing holds this body fully"),
         ("body.table", beam(length=0.4, modes=4), r"something holds this body"),
         ("body.table.centre", 0.41, r"body\.table\.centre"),
