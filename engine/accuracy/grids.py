@@ -61,7 +61,7 @@ class SceneGrid:
 
     unit: steps of the grid per unit of scene time; as many as the study fixes, where it fixes them. places: of each
     envelope that marches watch, at most. common: the columns of the ladder that all scenes of a sweep have, where
-    pilots of some choose for others.
+    pilots of some choose for others, and shared: their scheme.
     """
 
     asked: Asked
@@ -70,6 +70,7 @@ class SceneGrid:
     unit: int
     places: int = MOST_PLACES
     common: tuple[Numerics, ...] | None = None
+    shared: Scheme | None = None
     _models: dict[Numerics, SceneModel] = field(default_factory=dict)
     _readings: dict[tuple[str, int, int, int], Statics] = field(default_factory=dict)
 
@@ -209,7 +210,9 @@ def open_scheme(grid: SceneGrid) -> Scheme:
     """The scheme of a study that leaves it open: Fox-Goodwin's, whose fast modes take mass; average acceleration, which
     has no limit, where springs are stiff: beside modes in free vibration, or so that their limit asks for more steps
     than it is worth; one that damps where carriages move so slowly, and are not dropped, that periods of their contacts
-    are short steps."""
+    are short steps. The scenes of a sweep share one."""
+    if grid.shared is not None:
+        return grid.shared
     if not grid.scene.springs:
         return SCALED_FOX_GOODWIN
     fewest = grid.mode_levels[0] if open_bodies(grid.scene.study) else 0

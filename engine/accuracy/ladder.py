@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.accuracy.grids import AVERAGE_ACCELERATION, SceneGrid, open_scheme
+from engine.accuracy.grids import AVERAGE_ACCELERATION, DAMPED, SceneGrid, open_scheme
 from engine.accuracy.jobs import Halted
 from engine.accuracy.results import between_peaks, deciding, differences, results_of, worst_held
 from engine.march.outcome import Asked, Outcome, outcome
@@ -25,7 +25,6 @@ from results_schema.status import Fidelity
 
 if TYPE_CHECKING:
     from engine.accuracy.reference import Converged, Level
-    from engine.kernels.schemes import Scheme
 
 MODES = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)  # each a third to a half more than the one before
 SIMPLER = (("static", Fidelity.STATIC), ("force", Fidelity.FORCE), ("mass", Fidelity.MASS))  # than the carriages' own
@@ -47,8 +46,8 @@ class Ladder:
     cuts: tuple[int, ...]
 
 
-def ladder_of(asked: Asked, grid: SceneGrid, scheme: Scheme | None = None) -> Ladder:
-    """The ladder within what the study fixes, by the scheme that all scenes of a sweep have where there are several."""
+def ladder_of(asked: Asked, grid: SceneGrid) -> Ladder:
+    """The ladder within what the study fixes."""
     if grid.common is not None:
         return Ladder(grid.common, (1,) if grid.fixed else CUTS)
     study, says = asked.study, grid.scene.numerics
@@ -57,7 +56,7 @@ def ladder_of(asked: Asked, grid: SceneGrid, scheme: Scheme | None = None) -> La
     modes = [count for count in MODES if count > rigid] if names else [0]
     is_open = study.solver.scheme == "auto" and not grid.fixed
     columns = [
-        says._replace(fidelity=name, scheme=(scheme or open_scheme(grid)) if is_open else says.scheme, modes=count)
+        says._replace(fidelity=name, scheme=open_scheme(grid) if is_open else says.scheme, modes=count)
         for name in _models(asked, grid)
         for count in (modes[:1] if name == "static" and says.static_correction else modes)
     ]
@@ -68,8 +67,10 @@ def share_ladder(asked: Asked, grids: Sequence[SceneGrid]) -> None:
     """Let the scenes of a sweep have one ladder, of the columns that all of them have: what pilots of some scenes find
     is told to the others."""
     schemes = {open_scheme(grid) for grid in grids}
-    scheme = schemes.pop() if len(schemes) == 1 else AVERAGE_ACCELERATION
-    of_each = [ladder_of(asked, grid, scheme).columns for grid in grids]
+    if len(schemes) > 1:  # one that any scene may have, references too: beside others' the rungs cost more than these
+        for grid in grids:
+            grid.shared = DAMPED if DAMPED in schemes else AVERAGE_ACCELERATION
+    of_each = [ladder_of(asked, grid).columns for grid in grids]
     known = set.intersection(*map(set, of_each))
     for grid in grids:
         grid.common = tuple(column for column in of_each[0] if column in known)
