@@ -126,7 +126,7 @@ def told_missed(plan: Plan, parts: Sequence[Part]) -> str:
         return ""
     looked_at, missed = sum(part.held.size for part in parts), sum(int((part.held > 1.0).sum()) for part in parts)
     found = worst(plan, parts) if missed else None
-    if found is None:
+    if found is None or found.error <= found.asked:  # those beyond have no estimate, as the table says
         return ""
     who = f"{missed:,} of {counted(looked_at, 'variant')} looked at"
     is_sensor = found.result.of in plan.study.sensor
