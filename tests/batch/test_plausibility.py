@@ -134,6 +134,9 @@ CASES = {
     "body.bar.mass = 0.0001 kg: its radius of gyration is more than five times its length, expected at least": (
         on_wheels().with_values({"body.bar.mass": 1e-4})
     ),
+    "body.bar.inertia = 1e-12 kg m2: next to nothing turns: on its contacts it swings so fast that no march": (
+        on_wheels().with_values({"body.bar.inertia": 1e-12})
+    ),
     "the force of carriage car is negative, so that it lifts: weights are positive": passing(car=force(-0.1, WAY)),
     "carriage car pulls for a part of each swing, as its amplitude, 2 N, is above its force": passing(
         car=force(1.0, WAY, pulsation={"amplitude": 2.0, "frequency": 1.0})
