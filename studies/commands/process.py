@@ -56,6 +56,8 @@ def set_up() -> None:
 def leave_dask_out() -> None:
     """Let xarray look for dask, as it does at its first index, while there is none: to import it takes a third of a
     second, and no command meets an array of it."""
+    if "dask" in sys.modules:
+        return
     sys.modules["dask"] = None  # type: ignore[assignment]  # as Python has what is not there
     try:
         import xarray as xr

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from engine.kernels.compiling import WORDS
+from results_schema.garbage import NEW_OBJECTS
 from results_schema.status import Status
 from studies.commands import screens
 from studies.commands.console import paragraphs, progress_bar, say_compiling
@@ -90,6 +91,14 @@ def test_warnings_of_libraries_stay_away_from_the_screen(tmp_path: Path) -> None
     warned += "; c.process.set_up = lambda: (s(), warnings.warn('overflow', RuntimeWarning)); c.main()"
     done = shell(tmp_path, f'PYTHONWARNINGS= "$1" -c "{warned}" list')
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_commands_import_no_dask_and_collect_garbage_seldom(tmp_path: Path) -> None:
+    """A third of a second each, of a run that takes one; who asks for dask afterwards has it."""
+    write(tmp_path)
+    told = "import gc, sys, studies.commands.cli as c; c.main(); print('dask' in sys.modules, gc.get_threshold()[0])"
+    done = shell(tmp_path, f'"$1" -c "{told}; import dask.array" run small.toml')
+    assert done.returncode == 0 and done.stdout.splitlines()[-1] == f"False {NEW_OBJECTS}"
 
 
 def test_a_long_run_tells_how_far_it_is_where_no_terminal_shows_a_bar(capsys: pytest.CaptureFixture[str]) -> None:
