@@ -27,6 +27,7 @@ RINGS = 5.0  # first periods after a train: of two spans 3.4 m/s2 were seen afte
 SHORT = 0.5  # of the length of the body: a way of a load that passes; cranes' are nine tenths of theirs
 WIDE = 0.01  # of the length: a band of settling; cranes sag by a 500th at most, all of which lies within
 SLOW = 0.1  # Hz, of a mass on its spring: vehicles swing at 0.5 to 20 Hz, and at a thirtieth of that on N/m for kN/m
+YIELDS = 0.5  # of the length of a body: coaches stand a quarter of a metre deep on their springs
 FARTHEST = 100.0  # m from axle to axle: those of the longest wagons stand 20 m apart
 MOST_DAMPING = 0.3  # of critical: hardly any structure has more
 NEXT_TO_NO_DAMPING = 1e-4  # of critical: springs of steel alone have more; as a ratio is a number of N s/m
@@ -218,6 +219,22 @@ def swings_slowly(plan: Plan) -> Iterator[str]:
                 f"the sprung mass of {table.replace('.', ' ')} swings at {frequencies.min():.2g} Hz on its spring: "
                 "were kilonewtons per metre meant?"
             )
+    yield from _yields_far(plan)
+
+
+def _yields_far(plan: Plan) -> Iterator[str]:
+    """One sentence for every contact that yields by a good part of the length of the body that stands on it."""
+    found = dict[tuple[str, str], float]()
+    for grid in plan.grids:
+        for number, tie in enumerate(grid.scene.carriages):
+            contacts = grid.scene.study.carriage[tie.name].riding_contacts
+            for (name, contact), load in zip(contacts.items(), tie.loads, strict=False):
+                sunk = float(load.share * weight(grid.scene, grid.values, number).max() / contact.spring)
+                if tie.rides is not None and sunk > YIELDS * grid.scene.bodies[tie.rides].modal.length:
+                    found[tie.name, name] = max(sunk, found.get((tie.name, name), 0.0))
+    for (carriage, name), sunk in found.items():
+        table = plan.study.source.written(f"carriage.{carriage}")
+        yield f"{table}.contacts.{name} yields by {sunk:.3g} m under the weight that it bears: is its stiffness right?"
 
 
 def does_not_swing(plan: Plan) -> Iterator[str]:

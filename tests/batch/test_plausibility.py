@@ -134,6 +134,9 @@ CASES = {
     "body.bar.mass = 0.0001 kg: its radius of gyration is more than five times its length, expected at least": (
         on_wheels().with_values({"body.bar.mass": 1e-4})
     ),
+    "carriage.car.contacts.far yields by 5 m under the weight that it bears: is its stiffness right?": (
+        on_wheels().with_values({"carriage.car.contacts.far.stiffness": 1e-3})
+    ),
     "body.bar.inertia = 1e-12 kg m2: next to nothing turns: on its contacts it swings so fast that no march": (
         on_wheels().with_values({"body.bar.inertia": 1e-12})
     ),
