@@ -67,7 +67,7 @@ def share_ladder(asked: Asked, grids: Sequence[SceneGrid]) -> None:
     """Let the scenes of a sweep have one ladder, of the columns that all of them have: what pilots of some scenes find
     is told to the others."""
     schemes = {open_scheme(grid) for grid in grids}
-    if len(schemes) > 1:  # one that any scene may have, references too: beside others' the rungs cost more than these
+    if len(schemes) > 1:  # references too: rungs that cost more than a reference by another scheme were never judged
         for grid in grids:
             grid.shared = DAMPED if DAMPED in schemes else AVERAGE_ACCELERATION
     of_each = [ladder_of(asked, grid).columns for grid in grids]

@@ -1,7 +1,7 @@
 """Remarks of carriages: swept limits of motions that some variants do not reach, wheels that stay level, runs that end
 with a train, loads that vanish on their way or point up, masses that hardly swing on their springs; and bands of
-settling that are no band; units that are a prefix off; carriages that load nothing, and bodies that hardly move as they
-are damped so much."""
+settling that are no band; units that are a prefix off; contacts that yield far; carriages that load nothing, and bodies
+that hardly move as they are damped so much."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ RINGS = 5.0  # first periods after a train: of two spans 3.4 m/s2 were seen afte
 SHORT = 0.5  # of the length of the body: a way of a load that passes; cranes' are nine tenths of theirs
 WIDE = 0.01  # of the length: a band of settling; cranes sag by a 500th at most, all of which lies within
 SLOW = 0.1  # Hz, of a mass on its spring: vehicles swing at 0.5 to 20 Hz, and at a thirtieth of that on N/m for kN/m
-YIELDS = 0.5  # of the length of a body: coaches stand a quarter of a metre deep on their springs
+YIELDS = 0.5  # of the length of a body, by its springs: coaches yield by a quarter of a metre, a hundredth of theirs
 FARTHEST = 100.0  # m from axle to axle: those of the longest wagons stand 20 m apart
 MOST_DAMPING = 0.3  # of critical: hardly any structure has more
 NEXT_TO_NO_DAMPING = 1e-4  # of critical: springs of steel alone have more; as a ratio is a number of N s/m
@@ -227,10 +227,14 @@ def _yields_far(plan: Plan) -> Iterator[str]:
     found = dict[tuple[str, str], float]()
     for grid in plan.grids:
         for number, tie in enumerate(grid.scene.carriages):
+            if tie.rides is None:
+                continue
+            heaviest = float(weight(grid.scene, grid.values, number).max())
+            most = YIELDS * grid.scene.bodies[tie.rides].modal.length
             contacts = grid.scene.study.carriage[tie.name].riding_contacts
-            for (name, contact), load in zip(contacts.items(), tie.loads, strict=False):
-                sunk = float(load.share * weight(grid.scene, grid.values, number).max() / contact.spring)
-                if tie.rides is not None and sunk > YIELDS * grid.scene.bodies[tie.rides].modal.length:
+            for (name, contact), load in zip(contacts.items(), tie.loads, strict=True):
+                sunk = load.share * heaviest / contact.spring
+                if sunk > most:
                     found[tie.name, name] = max(sunk, found.get((tie.name, name), 0.0))
     for (carriage, name), sunk in found.items():
         table = plan.study.source.written(f"carriage.{carriage}")

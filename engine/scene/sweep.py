@@ -106,7 +106,7 @@ class Cases:
         if axis is None:
             raise KeyError(path)
         place = self.dims.index(axis.dim)
-        values: NDArray[np.float64] = axis.columns(slice(None))[path].astype(np.float64)
+        values: NDArray[np.float64] = axis.columns(slice(None))[path].astype(np.float64, copy=False)
         if len(self.dims) > 1:
             values = np.tile(np.repeat(values, prod(self.shape[place + 1 :])), prod(self.shape[:place]))
         return values

@@ -67,7 +67,8 @@ def test_what_moves_freely_has_inertia(joint: str, nothing: dict[str, float], ke
 def test_a_carrier_of_no_mass_moves_freely_with_what_hangs_on_it() -> None:
     carrier = {"body": {"sled": PAYLOAD | {"mass": 0.0}, "arm": ARM}}
     frames = {"sled": {"joints": [{"kind": "prismatic", "axis": [1, 0, 0]}]}, "arm": {"on": "sled"}}
-    swinging(None, **carrier, frame=frames)
+    given = swinging(None, **carrier, frame=frames)
+    assert given.value("body.sled.mass") == 0.0 and given.frame["arm"].on == "sled"
 
 
 def test_rigid_bodies_on_contacts_have_a_mass() -> None:
