@@ -128,6 +128,7 @@ def test_a_long_run_ends_in_time(here: Path, signals: list[signal.Signals], code
     assert list(here.glob("long.nc.parts/*.sha256")) and not (here / "long.nc").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.fault(48)
 def test_a_run_ends_while_its_kernels_compile(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A signal comes when one kernel is compiled and the next one, which takes many seconds, is not."""

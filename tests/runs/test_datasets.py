@@ -81,7 +81,10 @@ for call in sys.argv[1:]:
 CALLS = ["write other.nc", "report page", "export found.csv", "answer", "figures", "errors"]
 
 
-@pytest.mark.parametrize(("kind", "calls"), [("passage", CALLS), ("asymmetry", ["report page"])])
+@pytest.mark.parametrize(
+    ("kind", "calls"),
+    [pytest.param("passage", CALLS, marks=pytest.mark.slow), ("asymmetry", ["report page", "write other.nc"])],
+)
 def test_an_archive_is_known_to_a_fresh_process(kind: str, calls: list[str], tmp_path: Path) -> None:
     """`report` and `write` refused every archive whose kind of study had not been used before."""
     studies.write(scenes.run(kind, scenes.pace(kind)), tmp_path / "found.nc")
