@@ -68,7 +68,8 @@ def _reads_nothing(plan: Plan) -> Iterator[str]:
     for sensor in build_sensors(plan.base):
         if sensor.silent(plan.base) and f"sensor.{sensor.name}" not in limited:
             reads = sensor.quantity.replace("_", " ")
-            yield f"sensor {sensor.name} reads 0: its body has no {reads} there, as at a support or a free end"
+            why = "as at a support, a free end or by symmetry"
+            yield f"sensor {sensor.name} reads 0: its body has no {reads} there, {why}"
 
 
 def _between_places(plan: Plan) -> Iterator[str]:

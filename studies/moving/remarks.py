@@ -177,7 +177,7 @@ def _reads_nothing(looked: Looked) -> Iterator[str]:
         rows = [body.reading(sensor.reads, x) for x in (sensor.at, *np.linspace(0.0, body.length, PLACES))]
         here, *along = (np.abs(row).max(initial=0.0) for row in rows)
         if here <= ROUNDING * max(along):
-            why = "there, as at a support or a free end" if body.omega.size else "as it does not bend"
+            why = "there, as at a support, a free end or by symmetry" if body.omega.size else "as it does not bend"
             yield (
                 f"sensor {name} reads 0: its body has no {sensor.quantity.replace('_', ' ')} {why}; in frames that "
                 'move quantity = "position_error" reads how far a place is from where the rigid arm would have it'

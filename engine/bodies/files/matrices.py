@@ -11,11 +11,12 @@ import numpy as np
 
 from engine.bodies.files.model import DIRECTIONS, MAX_FREEDOMS, FileModel, checked, hashes_of
 from engine.bodies.files.text import Line, file_bytes, lines_of, real, whole
-from results_schema.errors import BadInput
+from results_schema.errors import BadInput, shortened
 from results_schema.lazy_imports import sparse
 
 NUMPY = b"\x93NUMPY"  # how a .npy file begins
 SPARSE = "%%MatrixMarket matrix ..., or a sparse matrix of scipy as .npz"
+SAVED = "scipy.sparse.save_npz(path, scipy.sparse.csc_array(matrix))"
 _SPARSE = ("csr", "csc", "coo")
 _MODAL = ("0", "q", "modal")
 
@@ -31,8 +32,9 @@ def read_matrices(files: Mapping[str, str], options: Mapping[str, Any]) -> FileM
     for key, matrix in (("stiffness", stiffness), ("mass", mass)):
         if matrix.shape != (len(owner), len(owner)):
             size = " x ".join(str(part) for part in matrix.shape)
-            what, expected = f"the {key} matrix does not fit the degrees of freedom", f"{len(owner)} x {len(owner)}"
-            raise BadInput(what, where=files[key], expected=expected, received=size)
+            told = f" that {files['freedoms']} names" if "freedoms" in files else ""
+            what = f"the {key} matrix does not fit the {len(owner)} degrees of freedom{told}"
+            raise BadInput(what, where=files[key], expected=f"{len(owner)} x {len(owner)}", received=size)
     held = np.zeros(len(owner), dtype=np.bool_)
     recovery = read_matrix(files["recovery"], file_bytes(files["recovery"])) if "recovery" in files else None
     model = FileModel(stiffness, mass, nodes, places, owner, direction, held, hashes_of(*files.values()), recovery)
@@ -42,8 +44,7 @@ def read_matrices(files: Mapping[str, str], options: Mapping[str, Any]) -> FileM
 def read_matrix(path: str, raw: bytes) -> Any:
     """A sparse matrix from Matrix Market text or scipy's NPZ. Raises BadInput."""
     if raw.startswith(NUMPY):
-        remedy = "scipy.sparse.save_npz(path, scipy.sparse.csc_array(matrix))"
-        raise BadInput("this is an array of numpy", where=path, expected=SPARSE, remedy=remedy)
+        raise BadInput("this is an array of numpy", where=path, expected=SPARSE, remedy=SAVED)
     found = _from_npz(path, raw) if raw[:2] == b"PK" else from_market(lines_of(path, raw))
     if np.iscomplexobj(found):
         raise BadInput("a complex matrix", where=path, expected="real numbers")
@@ -54,11 +55,14 @@ def _from_npz(path: str, raw: bytes) -> Any:
     """Of scipy's `save_npz`; pickles are refused, indices checked."""
     try:
         with np.load(BytesIO(raw), allow_pickle=False) as found:
+            if "format" not in found:
+                what, received = "these are arrays of numpy", ", ".join(map(shortened, found))
+                raise BadInput(what, where=path, expected=SPARSE, received=received, remedy=SAVED)
             form, shape = found["format"].item(), tuple(int(size) for size in found["shape"])
             form = form.decode("ascii") if isinstance(form, bytes) else str(form)
             if form not in _SPARSE or len(shape) != 2 or max(shape) > MAX_FREEDOMS:
-                expected = f"a csr, csc or coo matrix of at most {MAX_FREEDOMS} rows"
-                raise BadInput("not a matrix of a model", where=path, expected=expected, received=f"{form} {shape}")
+                what, expected = "this matrix is not read", f"a csr, csc or coo matrix of at most {MAX_FREEDOMS} rows"
+                raise BadInput(what, where=path, expected=expected, received=f"{form} {shape}", remedy=SAVED)
             data = found["data"]
             if data.dtype.kind not in "fiu" or data.ndim != 1:
                 raise BadInput("not a matrix of real numbers", where=path, received=str(data.dtype))
@@ -79,7 +83,7 @@ def nodes_of(lines: list[Line]) -> tuple[Any, Any]:
     """Numbers (P,) and coordinates (P, 3) from lines `node, x, y, z`, with a heading or without. Raises BadInput."""
     numbers: dict[int, int] = {}
     places: list[tuple[float, float, float]] = []
-    for line, fields in _rows(lines, 4):
+    for line, fields in _rows(lines, ("node", "x", "y", "z")):
         number = whole(line, fields[0])
         if number in numbers:
             raise line.fault(f"node {number} is defined twice", expected=f"first in line {numbers[number]}")
@@ -99,8 +103,11 @@ def freedoms_of(lines: list[Line], nodes: Any) -> tuple[Any, Any]:
     known = {int(number): place for place, number in enumerate(nodes)}
     words = {word: index for index, word in enumerate(DIRECTIONS)} | {str(i + 1): i for i in range(6)}
     found: dict[tuple[int, int], int] = {}
-    for line, fields in _rows(lines, 2):
+    for line, fields in _rows(lines, ("node", "direction")):
         number, word = whole(line, fields[0]), fields[1].strip().lower()
+        if word == "0" and number in known:
+            expected = f"1 to 6, or modal where {number} is the number of a modal coordinate"
+            raise line.fault("no such direction", expected=expected, received=fields[1])
         if word in _MODAL:
             row = (-1, number)
         elif word not in words:
@@ -133,17 +140,21 @@ def freedoms_in_order(size: int, nodes: int, where: str) -> tuple[Any, Any]:
     )
 
 
-def _rows(lines: list[Line], count: int) -> list[tuple[Line, list[str]]]:
-    """Lines that hold something, split at commas or semicolons; a heading, comments after # left out."""
+def _rows(lines: list[Line], names: tuple[str, ...]) -> list[tuple[Line, list[str]]]:
+    """Lines that hold something, split at commas or semicolons; a heading, comments after # left out. names: of the
+    columns, which a heading may not have in another order."""
     found: list[tuple[Line, list[str]]] = []
     for line in lines:
         text = line.text.partition("#")[0].strip()
         fields = [field.strip().strip('"') for field in re.split("[,;]", text)]
         heading = not found and line.number <= 2 and not re.match(r"[+-]?\d", fields[0])
         if not text or (heading and re.match("[A-Za-z]", fields[0])):
+            told = tuple(field.lower() for field in fields)
+            if told != names and sorted(told) == sorted(names):
+                raise line.fault("columns in another order", expected=", ".join(names), received=text)
             continue
-        if len(fields) != count:
-            raise line.fault("the line does not fit", expected=f"{count} fields", received=text)
+        if len(fields) != len(names):
+            raise line.fault("the line does not fit", expected=f"{len(names)} fields", received=text)
         found.append((line, fields))
     return found
 

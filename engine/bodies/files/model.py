@@ -54,6 +54,11 @@ class FileModel:
         """Rows of the matrices."""
         return len(self.owner)
 
+    @property
+    def numbered(self) -> str:
+        """What a node's number may be, in words."""
+        return f"one of {len(self.nodes)} nodes from {self.nodes.min()} to {self.nodes.max()}"
+
     def name(self, row: int) -> str:
         """A row in words: "node 12, rz"."""
         if self.owner[row] < 0:

@@ -66,10 +66,14 @@ def line_between(numbers: Counts, places: Array, ends: tuple[Array, Array], tole
     beside = np.linalg.norm(places - ends[0] - along[:, None] * tangent, axis=1)
     near = np.flatnonzero((beside <= limit) & (along >= -limit) & (along <= length + limit))
     if len(near) < 2:
-        received = (
-            f"{len(near)} within {limit:g} m; the nearest stand {np.sort(beside)[:2].round(6).tolist()} m beside it"
+        corners = (f"({', '.join(f'{x:.4g}' for x in corner)})" for corner in (places.min(axis=0), places.max(axis=0)))
+        raise BadInput(
+            f"too few nodes within {limit:g} m of this line, between its ends",
+            where="from",
+            expected="at least 2",
+            received=f"{len(near)}; nodes stand from {' to '.join(corners)} m, at least {beside.min():.4g} m beside it",
+            remedy="another line, tolerance = ... for nodes beside it, or length_unit where files are not in metres",
         )
-        raise BadInput("too few nodes near this line", where="from", expected="at least 2", received=received)
     order = near[np.argsort(along[near], kind="stable")]
     spacing = float(np.diff(along[order]).max())
     for key, gap in (("from", along[order[0]]), ("to", length - along[order[-1]])):

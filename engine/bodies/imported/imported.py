@@ -198,7 +198,9 @@ class Imported(Body):
         if spot.node is None or self.recorded is not None:
             return
         if spot.node not in self.model.nodes:
-            raise BadInput("there is no such node", where="node", expected="its number", received=shortened(spot.node))
+            remedy = f"{spot.node} without quotes" if str(spot.node).isdecimal() and isinstance(spot.node, str) else ""
+            what, received = "there is no such node", repr(spot.node) if remedy else shortened(spot.node)
+            raise BadInput(what, where="node", expected=self.model.numbered, received=received, remedy=remedy)
         place = int(np.flatnonzero(self.model.nodes == spot.node)[0])
         if not self._moves(place, unit(self.gravity_direction if spot.direction is None else spot.direction)):
             what = f"node {spot.node} does not move in this direction"
@@ -251,8 +253,7 @@ class Imported(Body):
             low, _, high = part.partition("-")
             chosen = (nodes >= int(low)) & (nodes <= int(high or low))
             if not chosen.any():
-                expected = f"one of {len(nodes)} nodes from {nodes.min()} to {nodes.max()}"
-                refuse(("supports", text), "there is no such node", expected=expected, received=part)
+                refuse(("supports", text), "there is no such node", expected=self.model.numbered, received=part)
             found |= chosen
         return np.flatnonzero(found)
 

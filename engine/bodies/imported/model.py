@@ -35,9 +35,9 @@ class HeldModel:
     """Matrices (n, n) on the free rows of a model.
 
     file: the model as read; free (n,): its rows; stiffness, mass: sparse, SI; motion (N, 6): unit translations and
-    rotations (about the origin) of all its rows; all_mass: mass of all rows; flexibility: factorised stiffness;
-    recovery (R, n): stress (Pa) of every row, None where there is none; pressure: the files' unit of stress in Pa, by
-    which rows of strain are too large.
+    rotations (about the origin) of all its rows; all_stiffness, all_mass: of all its rows; flexibility: factorised
+    stiffness; recovery (R, n): stress (Pa) of every row, None where there is none; pressure: the files' unit of stress
+    in Pa, by which rows of strain are too large.
     """
 
     file: FileModel
@@ -45,6 +45,7 @@ class HeldModel:
     stiffness: Any
     mass: Any
     motion: Array
+    all_stiffness: Any
     all_mass: Any
     flexibility: Flexibility
     recovery: Any = None
@@ -76,7 +77,7 @@ def held_model(body: Imported) -> HeldModel:
     flexibility = _factorised(file, free, inner, inertia, motion[free])
     recovery = None if recovery is None else recovery[:, free]
     pressure = body.force_unit / body.length_unit**2
-    return HeldModel(file, free, inner, inertia, motion, mass, flexibility, recovery, pressure)
+    return HeldModel(file, free, inner, inertia, motion, stiffness, mass, flexibility, recovery, pressure)
 
 
 def motions(file: FileModel, unit: float) -> Array:

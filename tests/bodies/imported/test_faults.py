@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.io import mmwrite
-from scipy.sparse import csc_matrix, save_npz, tril
+from scipy.sparse import csc_matrix, dia_array, save_npz, tril
 
 from engine.batch.plan import make_plan
 from engine.bodies.imported.imported import Matrices
@@ -57,6 +57,14 @@ def faults(folder: Path, files: Files) -> dict[str, tuple[dict[str, Any], list[s
         save_npz(folder / "complex.npz", csc_matrix(files.assembly.mass * 1j))
         return str(folder / "complex.npz")
 
+    def stored(name: str, form: Any) -> str:
+        save_npz(folder / name, form)
+        return str(folder / name)
+
+    def arrays() -> str:
+        np.savez(folder / "arrays.npz", K=np.eye(96))
+        return str(folder / "arrays.npz")
+
     nodes, rows, market = lines["nodes.csv"], lines["freedoms.csv"], lines["stiffness.mtx"]
     at = int(np.flatnonzero(files.assembly.free == 6 * 4 + 2)[0])  # node 5, z
     return {
@@ -98,7 +106,7 @@ def faults(folder: Path, files: Files) -> dict[str, tuple[dict[str, Any], list[s
         "slack": ({"stiffness": matrix(lambda k: slack(k, at))}, ["node 5, z", "no stiffness", "bed.supports"]),
         "track node": ({"track": {"nodes": [1, 99]}}, ["bed.track.nodes.1", "99"]),
         "track order": ({"track": {"nodes": [1, 9, 4, 2]}}, ["bed.track", "9 and 4"]),
-        "track beside": ({"track": {"from": [0, 1, 0], "to": [15, 1, 0]}}, ["bed.track", "too few", "1.0"]),
+        "track beside": ({"track": {"from": [0, 1, 0], "to": [15, 1, 0]}}, ["bed.track", "too few", "1 m beside it"]),
         "along": ({"gravity_direction": [1.0, 0.0, 0.0]}, ["bed.track.direction", "along the track"]),
         "support": (
             {"supports": {"77": "clamped"}},
@@ -121,6 +129,11 @@ def faults(folder: Path, files: Files) -> dict[str, tuple[dict[str, Any], list[s
             {"recovery": str(files.folder / "mass.npz"), "stress_rows": [[1]] * 16 + [[97]]},
             ["stress_rows.16", "1 to 96", "97"],
         ),
+        "other form": ({"mass": stored("dia.npz", dia_array(np.eye(96)))}, ["dia (96, 96)", "save_npz(path"]),
+        "arrays": ({"mass": arrays()}, ["arrays of numpy", '"K"', "save_npz(path"]),
+        "columns": ({"nodes": written("n.csv", "node,y,x,z", *nodes)}, ["line 1", "another order", "node, x, y, z"]),
+        "from 0": ({"freedoms": written("f.csv", "1,0", "1,1")}, ["line 1", "no such direction", "1 to 6"]),
+        "a row short": ({"freedoms": written("f.csv", *rows[:-1])}, ["the 95 degrees", "f.csv", "95 x 95", "96 x 96"]),
         "narrow": ({"recovery": written("r.mtx", *NARROW), "stress_rows": [[1]] * 17}, ["recovery", "96 columns", "2"]),
         "few": ({"track": {"nodes": [1, 7, 2], "interpolation": "spline"}}, ["bed.track", "at least 4"]),
         "zero byte": ({"mass": "a\0b"}, ["bed.mass", "path"]),

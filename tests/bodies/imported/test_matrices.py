@@ -232,6 +232,7 @@ def test_units_of_the_files(loose: Files, tmp_path: Path) -> None:
         Study(kind="passage", body={"bed": files.table(mass=str(tmp_path / "mass.mtx"), **units)}).body["bed"]
     )
     wanted = modal(loose.table(supports={"1": "clamped"}))
+    assert not found.doubts and float(dict(found.checks)["rigid motions by the coordinates"].split()[0]) < 1e-10
     assert np.abs(found.omega / wanted.omega - 1.0).max() < 1e-9
     assert found.mass == pytest.approx(wanted.mass, rel=1e-9)
     assert (
@@ -241,6 +242,12 @@ def test_units_of_the_files(loose: Files, tmp_path: Path) -> None:
         ).max()
         < 1e-9
     )
+
+
+def test_stiffness_and_mass_in_each_others_place_are_doubted(loose: Files) -> None:
+    other = {"stiffness": str(loose.folder / "mass.npz"), "mass": str(loose.folder / "stiffness.mtx")}
+    (said,) = modal(loose.table(supports={"1": "clamped"}, **other)).doubts
+    assert "are stiffness and mass exchanged" in said
 
 
 def test_an_inclined_track_stretches(tmp_path: Path) -> None:

@@ -68,7 +68,7 @@ SAID = {
     "arm is clamped where frame.arm.joints.0 turns freely: no moment acts there, and clamped shapes need many modes": (
         driven(joints=[HINGE])
     ),
-    "sensor low reads 0: its body has no bending moment there, as at a support or a free end": driven(
+    "sensor low reads 0: its body has no bending moment there, as at a support, a free end or by symmetry": driven(
         sensor={"low": {"body": "arm", "at": 10.0, "quantity": "bending_moment"}}
     ),
 }
