@@ -169,8 +169,9 @@ def converge(
         model = grid.model(levels.numerics[level])
         apart = differences(asked, model, own, found.outcome.of(active), now)
         remaining = left_over(apart, change[:, active], least)
-        if model.body_modes == modes:  # by which these converge: no smaller by steps alone
-            remaining[slow] = np.maximum(remaining[slow], found.error[slow][:, active])
+        remaining[slow] = np.maximum(
+            remaining[slow], left_by_modes(apart, found.error[:, active], modes / model.body_modes)[slow]
+        )
         modes = model.body_modes
         if pushes_along and not (is_corrected and level == 1):
             stays = STAYS if is_corrected else STAYS_UNCORRECTED
@@ -206,6 +207,14 @@ def left_over(change: Array, before: Array, least: Array | float = LEAST_LEFT) -
     foretold = np.clip(np.maximum(foretold, np.minimum(CAUTION * foretold, 1.0)), least, MOST_LEFT)
     known = np.where(np.isfinite(ratio), foretold, np.maximum(FIRST_LEFT, least))
     return np.where(np.isinf(change), np.nan, change * known)
+
+
+def left_by_modes(change: Array, before: Array, fewer: float) -> Array:
+    """(R, V) what is left of an error that falls as the number of modes grows, ``fewer`` of which the level before had,
+    and no faster: what it changed tells by how much, and steps alone change nothing of it (before: NaN where unknown).
+    """
+    found = fewer * before
+    return found if fewer == 1.0 else np.fmax(found, change * fewer / (1.0 - fewer))
 
 
 def left_along(change: Array, before: Array, stays: float) -> Array:

@@ -20,6 +20,7 @@ from engine.march.step_rules import between_stations
 from engine.march.tables import SceneTables
 from engine.model.lane_table import in_whole_blocks, weight, weights
 from engine.model.scene_model import SceneModel
+from engine.model.strikes import Strikes
 from engine.model.timeline import Window
 from engine.observation.contact_forces import contacts_that_react, first_place_counted
 from engine.observation.cycle_reduction import Cycle, Reduction
@@ -41,15 +42,13 @@ ENDS = (("max", layout.LARGEST, layout.LARGEST_AT), ("min", layout.SMALLEST, lay
 
 @dataclass(frozen=True, eq=False)
 class Asked:
-    """What a study reports of a variant. accelerated: whether its kind keeps the carriages' accelerations. at_once:
-    whether a load comes onto a body at an instant, where that gives way. unsprung: whether a mass touches one."""
+    """What a study reports of a variant. accelerated: whether its kind keeps the carriages' accelerations."""
 
     study: Study
     reduction: Reduction | None
     window: Window
-    accelerated: bool = False
-    at_once: bool = False
-    unsprung: bool = False
+    accelerated: bool
+    strikes: Strikes
 
     @property
     def keeps_histories(self) -> bool:

@@ -162,24 +162,6 @@ class SceneModel:
         return np.asarray(found)
 
     @property
-    def loaded_at_once(self) -> bool:
-        """Whether a load comes onto a body at an instant, at a place that gives way: every mode is struck then."""
-        return any(self._comes_at_once(load) for carriage in self.carriages for load in carriage.attachments)
-
-    @property
-    def has_unsprung(self) -> bool:
-        """Whether a mass touches a body without a spring."""
-        return any(carriage.inertia != "force" for carriage in self.carriages)
-
-    def _comes_at_once(self, load: Attachment) -> bool:
-        if load.rider is None or (self.study.start == "equilibrium" and self.riders[load.rider].stays):
-            return False
-        rider, modal = self.riders[load.rider], self.bodies[load.body].modal
-        place = float(rider.motion.path(np.zeros(1)).S[0]) + rider.offset
-        ends = (place <= 0.0, modal.held_ends[0]), (place >= rider.length, modal.held_ends[1])
-        return not any(at and held for at, held in ends)
-
-    @property
     def riders(self) -> tuple[Rider, ...]:
         """The ways of all carriages, then of all contacts of bodies that ride."""
         return (*(carriage.rider for carriage in self.carriages), *self.contacts)

@@ -26,6 +26,8 @@ from engine.accuracy.reference import (
 from engine.accuracy.results import differences, results_of, tolerances
 from engine.batch.audit import audit
 from engine.batch.plan import make_plan
+from engine.bodies.frame.assembly import assemble
+from engine.bodies.frame.frame import Frame
 from engine.bodies.modal.description import MAX_MODES
 from engine.march.outcome import outcome
 from engine.scene.study import Study
@@ -269,15 +271,36 @@ def test_a_mass_that_is_let_go_touches_with_what_its_modes_weigh_there(modes: in
     assert np.isnan(error) if modes == MAX_MODES else least / weight <= error <= 5.0 * least / weight
 
 
+SLIM = {"box": PORTAL["section"]["box"] | {"second_moment_lateral": 2e-7, "torsion_constant": 1e-6}}
+
+
+@pytest.mark.parametrize(("elements", "mass"), [(8, 40.0), (12, 40.0), (12, 400.0), (20, 40.0), (20, 400.0)])
+def test_a_last_level_of_hardly_more_modes_tells_no_less_of_what_these_converge_by(elements: int, mass: float) -> None:
+    """Of 51, 59 and 64 modes the last ones change little: three times that was a half of the error. The truth is g m
+    m_F/(m + m_F), m_F the mass that the whole finite-element model has there; sensors tell the same as carriages."""
+    girder = PORTAL["member"]["girder"] | {"elements": elements}
+    portal = PORTAL | {"section": SLIM, "member": PORTAL["member"] | {"girder": girder}, "damping_ratio": 0.02}
+    car = {"car": {"on": "portal", "kind": "mass", "mass": mass, "motion": cruise(1.0, 3.0, 2.0)}}
+    sensor = {"middle": {"body": "portal", "at": 2.0}, "wheel": {"carriage": "car", "quantity": "contact_force"}}
+    found = studies.run(Study(kind="passage", initial="rest", body={"portal": portal}, carriage=car, sensor=sensor))
+    assembly = assemble(Frame.model_validate(portal))
+    node = np.flatnonzero(np.linalg.norm(assembly.mesh.points - [1.0, 0.0, 2.0], axis=1) < 1e-9)
+    row = np.flatnonzero(assembly.free == 6 * node + 2).item()
+    light = np.linalg.inv(assembly.mass.toarray())[row, row]
+    least, weight = float(found.wheel_min), mass * 9.80665
+    told = [float(found.estimated_error.sel(result=name)) for name in ("wheel_min", "car_contact_force_min")]
+    assert least == float(found.car_contact_force_min)
+    assert told[0] == told[1] >= least / weight - 1.0 / (1.0 + mass * light) > 0.0
+
+
 def test_levels_have_more_and_more_of_the_modes_that_loads_excite() -> None:
     """A portal so slender across its plane that its first dozen modes sway and twist there, beside 60 modes; a beam,
     all of whose modes are excited."""
     way = cruise(0.5, 3.5, 60.0)
-    slim = {"box": PORTAL["section"]["box"] | {"second_moment_lateral": 2e-7, "torsion_constant": 1e-6}}
     sensor = {"middle": {"body": "portal", "at": 2.0}}
 
     def run(**modes: int) -> Any:
-        portal = PORTAL | {"section": slim, "damping_ratio": 0.02} | modes
+        portal = PORTAL | {"section": SLIM, "damping_ratio": 0.02} | modes
         car = {"car": {"on": "portal", "kind": "mass", "mass": 400.0, "motion": way}}
         scene = Study(kind="passage", body={"portal": portal}, carriage=car, sensor=sensor, solver={"tolerance": 1e-3})
         return studies.run(scene), scene
