@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import accumulate
-from typing import Annotated, Any, ClassVar, Literal, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, TypeVar, get_args
 
 import numpy as np
 from pydantic import AfterValidator, Field, Strict, Tag, ValidationError, model_validator
 
 from engine.scene.motions.along_bodies import AnyMotion
 from engine.scene.motions.base import Motion
+from engine.scene.motions.standing import Standing
 from engine.study_file.document import Document
 from engine.study_file.refusals import refuse
 from engine.study_file.spec import LIKE_OSCILLATORS, LIST, NUMBER, KindOf, Noun, Spec, by_amount_form
@@ -295,15 +296,19 @@ def axle_name(train: str, axle: int) -> str:
 
 
 def with_axles(document: Document) -> Document:
-    """The document with a carriage for every axle, behind those that were written. Raises BadInput.
+    """The document with a carriage for every axle, behind those that were written, and behind all that move those that
+    stand: the first one's way is what a study goes by. Raises BadInput.
 
     Errors in such a carriage name the train. What is written of one, as where one axle is swept, stands above what the
     train says.
     """
     data, source = document.data, document.source
     written = data.get("carriage", {})
-    if "train" not in data or not isinstance(written, dict):
+    if not isinstance(written, dict):
         return document
+    if "train" not in data:
+        ordered = _standing_last(written)
+        return document if list(ordered) == list(written) else Document(data | {"carriage": ordered}, source)
     try:
         trains = Trains(train=data["train"]).train
     except ValidationError as error:
@@ -321,7 +326,18 @@ def with_axles(document: Document) -> Document:
         if "kind" in written.get(name, {}):
             here, what = f"carriage.{name}", "two carriages have this name"
             raise source.fault(here, what, received=f"an axle of {trained_by[here]}", remedy="another name")
-    return Document(data | {"carriage": _overlaid(written, axles)}, replace(source, written_as=trained_by))
+    carriages = _standing_last(_overlaid(written, axles))
+    return Document(data | {"carriage": carriages}, replace(source, written_as=trained_by))
+
+
+def _standing_last(carriages: Mapping[str, Any]) -> dict[str, Any]:
+    """The carriages as they were written, but for those that stand."""
+
+    def stands(name: str) -> bool:
+        motion = carriages[name].get("motion") if isinstance(carriages[name], dict) else None
+        return isinstance(motion, dict) and motion.get("kind") in get_args(Standing.model_fields["kind"].annotation)
+
+    return {name: carriages[name] for name in sorted(carriages, key=stands)}
 
 
 def _overlaid(above: Mapping[str, Any], below: Mapping[str, Any]) -> dict[str, Any]:

@@ -282,7 +282,12 @@ def _along(results: Results, axis: Axis, beyond: Mask, among: Mask | None = None
     places = np.unique(axis.values)
     over = np.isin(places, _values_of(results, axis, beyond))
     if not over.any():
-        return "neither way" if axis.sets(DIRECTION) else f"nowhere from {axis.span}"
+        if axis.sets(DIRECTION):
+            return "neither way"
+        told = _values_of(results, axis, results.with_values if among is None else among & results.with_values)
+        if told.size == 1 < axis.values.size:
+            return f"nowhere, which is known at {axis.in_words(float(told[0]))} alone"
+        return f"nowhere from {axis.spans([told]) if told.size else axis.span}"
     steps = _steps(places)
     apart = np.flatnonzero(over[:-1] & over[1:] & (steps > GAP * np.median(steps)))
     if over.all() and not apart.size:

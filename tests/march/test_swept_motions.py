@@ -5,7 +5,7 @@ import pytest
 
 import engine
 from engine.batch.plan import make_plan
-from tests.engine.build import Table, beam, cruise, mass, oscillator, shuttle, study, swing
+from tests.engine.build import Table, beam, cruise, force, mass, oscillator, shuttle, study, swing
 
 MOTIONS: dict[str, Table] = {
     "cruise": cruise(0.0, 1.0, 0.3, after=0.5),
@@ -46,18 +46,31 @@ def test_swept_numbers_of_motions_do_what_they_do_alone(kind: str, key: str) -> 
 
 @pytest.mark.parametrize("first", [True, False])
 def test_what_stands_stands_as_by_waypoints(first: bool) -> None:
-    """As the first carriage, whose time is that of the scene, and beside one that moves."""
+    """As the first carriage, where none moves, whose time is that of the scene, and beside one that moves."""
     found = []
     for way in (
         {"kind": "standing", "at": 0.3, "time": 5.0},
         {"kind": "waypoints", "times": [0, 5], "positions": [0.3] * 2},
     ):
-        pair = [("car", mass(0.2, way)), ("other", mass(0.1, cruise(0.0, 1.0, 0.25)))]
-        given = study(beam(), dict(pair if first else pair[::-1]), solver={"steps": 800, "fidelity": "full"})
+        carriages = {"other": mass(0.1, way if first else cruise(0.0, 1.0, 0.25)), "car": mass(0.2, way)}
+        given = study(beam(), carriages, initial="rest", solver={"steps": 800, "fidelity": "full"})
         found.append(engine.run(given))
     for name in found[0].data_vars:
         if found[0][name].dtype.kind == "f" and "contact" not in str(name):
             np.testing.assert_allclose(found[0][name], found[1][name], rtol=1e-9, atol=1e-12)
+
+
+def test_what_moves_comes_before_what_stands() -> None:
+    """The first carriage's way is what places, figures and steps go by: "with tmd at 11.3 m" was said of trains."""
+    absorber = oscillator(0.05, 4.0, {"kind": "standing", "at": 0.5, "time": 1.0})
+    carriages = {
+        "absorber": absorber,
+        "first": mass(0.2, cruise(0.0, 1.0, 0.2)),
+        "second": force(1.0, MOTIONS["cruise"]),
+    }
+    given = study(beam(), carriages)
+    assert list(given.carriage) == ["first", "second", "absorber"] and given.clock == "first"
+    assert float(engine.run(given).midspan_max_position) == pytest.approx(0.445, abs=0.02)
 
 
 def test_a_carriage_that_stands_later_does_not_make_the_run_longer() -> None:

@@ -113,7 +113,9 @@ def settling(results: Results, sensors: list[str], asked: float | None) -> list[
     found = quantity(float((np.nanmin if with_move else np.nanmax)(rows[0].values)), "s")
     caption = (
         f"Time since {begun} until the reading stays within the band of its static value: {listed(bands)}.",
-        "Gaps: not settled by the end of the run." if any(np.isnan(row.values).any() for row in rows) else "",
+        "Gaps: not settled by the end of the run, or too late to tell that it is for good."
+        if any(np.isnan(row.values).any() for row in rows)
+        else "",
     )
     first = told[0].replace("_", " ")
     if with_move:
