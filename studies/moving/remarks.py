@@ -125,6 +125,24 @@ def _goes_on(looked: Looked) -> Iterator[str]:
         )
 
 
+def _stops_at_once(looked: Looked) -> Iterator[str]:
+    """Carriages with a mass whose given speed jumps before the march ends."""
+    study = looked.study
+    longest = max(float(sample.seconds.max()) for sample in looked.samples)
+    for name in driven(study):
+        carriage, motion = study.carriage[name], study.carriage[name].motion
+        end = motion.path(np.array([motion.duration]), "left")
+        jumps = [(one.tau, one.before) for one in motion.reversals()] + [(motion.duration, float(end.dS[0]))]
+        tau, before = next((jump for jump in jumps if jump[1] != 0.0), (np.inf, 0.0))
+        if carriage.inertial and carriage.start_time + tau * motion.time_scale < longest:
+            place, speed = float(motion.path(np.array([tau]), "left").S[0]), abs(before) / motion.time_scale
+            where = f"at {place:.4g} m of {carriage.on}, from {quantity(speed, 'm s-1')}"
+            yield (
+                f"{name} stops or turns within no time {where}: forces of its mass are then as large as steps are short; "
+                "waypoints let it brake"
+            )
+
+
 def _stands(looked: Looked) -> Iterator[str]:
     """Bodies that nothing moves and that carry nothing; where there is no joint at all, all of them."""
     study = looked.study
@@ -291,6 +309,6 @@ def _doubtful(looked: Looked) -> Iterator[str]:
 
 REMARKS: tuple[Callable[[Looked], Iterator[str]], ...]
 REMARKS = (
-    _doubtful, _degrees, _turned_fast, _over_an_end, _goes_on, _stands, _reads_nothing, _nothing_across, _moved_across,
-    _let_go, _clamped_at_a_hinge,
+    _doubtful, _degrees, _turned_fast, _over_an_end, _goes_on, _stops_at_once, _stands, _reads_nothing, _nothing_across,
+    _moved_across, _let_go, _clamped_at_a_hinge,
 )  # fmt: skip

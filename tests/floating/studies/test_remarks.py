@@ -52,6 +52,9 @@ SAID = {
     "frame.arm.joints.0.motion goes on until 1.5 s, and the march ends at 1 s": driven(joints=[LATER]),
     "frame.arm.joints.0.motion goes on until 2 s, and the march ends at 1 s": driven(joints=[SPIN]),
     "carriage.trolley.motion goes on until 4 s, and the march ends at 1 s": driven({"speed": 2.0}),
+    "trolley stops or turns within no time at 8 m of arm, from 12 m/s: forces of its mass are then as": driven(
+        {"kind": "cruise", "start": 2.0, "end": 8.0, "speed": 12.0}
+    ),
     "no body has a joint, so that all frames stand still": driven(joints=()),
     "nothing moves tool, which stands on the ground without a joint, and nothing rides or hangs on it": with_tool(),
     "sensor low reads 0: its body has no displacement as it does not bend": with_tool(
@@ -100,4 +103,4 @@ def test_nothing_is_remarked_of_ordinary_studies() -> None:
     assert KIND.remarks(heavy(frame={"arm": {"joints": [TURN], "turned": [0, "90 deg", 0]}})) == ()  # upright
     pinned = driven(arm={"supports": "pinned-free"}, joints=[HINGE])
     assert KIND.remarks(pinned) == KIND.remarks(driven(joints=[HINGE | {"stiffness": 1e4}])) == ()
-    assert len(REMARKS) == 11
+    assert len(REMARKS) == 12
