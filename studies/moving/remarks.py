@@ -138,8 +138,8 @@ def _stops_at_once(looked: Looked) -> Iterator[str]:
             place, speed = float(motion.path(np.array([tau]), "left").S[0]), abs(before) / motion.time_scale
             where = f"at {place:.4g} m of {carriage.on}, from {quantity(speed, 'm s-1')}"
             yield (
-                f"{name} stops or turns within no time {where}: forces of its mass are then as large as steps are short; "
-                "waypoints let it brake"
+                f"{name} stops or turns within no time {where}: forces of its mass are then as large as steps are "
+                "short; waypoints let it brake"
             )
 
 
