@@ -109,7 +109,12 @@ def _converge(plan: Plan, here: Place, until: Time) -> Looked:
     share = Shared(here, partial(_past, until.last, until.clock))
     jobs, parts, started, done = _samples(plan, 2 * here.slots), list[chosen.Part](), until.clock(), 0
     Shared(here)(plan, [Job(_awake, NOBODY)] * here.slots)
-    start, started = until.clock() - started, until.clock()
+    awake, started = until.clock() - started, until.clock()
+    try:  # modes of bodies, which all scenes of a process share: a run computes them once
+        share(plan, [Job(jobs[0].function, jobs[0].lanes[:1])] * here.slots)
+    except Halted:
+        return Looked([], 0.0, awake + UNFINISHED * (until.clock() - started), 1.0)
+    first, started = until.clock() - started, until.clock()
     for some in (jobs[::2], jobs[1::2]):
         if done and (until.clock() - started > until.usual - until.clock() or not some):
             break
@@ -117,9 +122,10 @@ def _converge(plan: Plan, here: Place, until: Time) -> Looked:
             parts += [part for found in share(plan, some) for part in found]
         except Halted:
             took = UNFINISHED * (until.clock() - started) / len(some)
-            return Looked(parts, took, start, len(parts) / max(done, 1))
+            return Looked(parts, took, awake, len(parts) / max(done, 1))
         done += len(some)
-    return Looked(parts, (until.clock() - started) / done, start, len(parts) / done)
+    took = (until.clock() - started) / done
+    return Looked(parts, took, awake + max(0.0, first - took * here.slots), len(parts) / done)
 
 
 def _samples(plan: Plan, count: int) -> list[Job[list[chosen.Part]]]:
