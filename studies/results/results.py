@@ -151,7 +151,8 @@ class Results:
         if own.reads.at_joint:
             return f"of {own.body}" if own.joint is None else f"of joint {own.joint} of {own.body}"
         if own.at is None:
-            return f"at {own.node or own.point}{own.way_in_words}"
+            numbered = "node " if str(own.node).isdecimal() else ""  # of a body out of files
+            return f"at {numbered}{own.node or own.point}{own.way_in_words}"
         swept = any(f"sensor.{sensor}.at" in axis.paths for axis in self.axes)
         where = f"at {'the swept place' if swept else quantity(own.at, 'm')} of {own.member or own.body}"
         return f"{where}{own.way_in_words}"
