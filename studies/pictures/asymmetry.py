@@ -55,11 +55,20 @@ def pictures(results: Results) -> list[Figure]:
     top = extreme(_odd_where_settled(results, sensors[0]))
     seen = view(results, SPEEDS, (*DAMPING, *MASSES), top)
     if seen.x is not None:
-        found += [_lag(seen, sensors, more), _parts(seen, sensors, more)]
+        found += [
+            make(seen, *_known(results, sensors, name, more)) for make, name in ((_lag, "lag"), (_parts, "odd_rms"))
+        ]
         by_mass = view(results, SPEEDS, MASSES, top)
         if by_mass.y is not None and _has_map(by_mass, seen, sensors[0]):
             found.append(_map(by_mass, sensors[0]))
     return found
+
+
+def _known(results: Results, sensors: list[str], name: str, more: str) -> tuple[list[str], str]:
+    """The sensors that have a result anywhere, or the first one, and in a sentence which have none."""
+    known = [sensor for sensor in sensors if np.isfinite(results.numbers(name, sensor)).any()] or sensors[:1]
+    left = [sensor for sensor in sensors if sensor not in known]
+    return known, f"{more} Not known of {listed(left)}, which at rest reads the same all the way." if left else more
 
 
 def _odd_where_settled(results: Results, sensor: str) -> Array:

@@ -90,6 +90,17 @@ def test_the_lag_is_drawn_with_its_theory() -> None:
     assert any(np.allclose(np.abs(line.get_ydata() / expected), 1e3) for line in solid)
 
 
+def test_panels_without_a_lag_are_left_out() -> None:
+    """Of a wheel's force, which is the same all the way at rest, a dashed line and two empty panels were drawn."""
+    dataset = scenes.run("asymmetry", f"{scenes.pace('asymmetry', 0.2, 1.0, 5)}\n{DAMPING}")
+    for name in ("lag", "odd_rms", "even_excess"):
+        dataset[name].loc[{"sensor": "moment"}] = np.nan
+    told = {figure.name: figure for figure in answers.figures(dataset)}
+    for name, panels in (("lag", 1), ("odd-and-even", 2)):
+        assert len(told[name].drawing.axes) == panels
+        assert "Not known of moment, which at rest reads the same all the way." in told[name].caption
+
+
 def test_unsorted_axes_are_drawn_in_order() -> None:
     results = Results.of(scenes.run("passage", MASS))
     (curve,) = views.view(results).curves(results.of_sensor("dynamic_amplification", "midspan"))
