@@ -102,6 +102,17 @@ def test_one_place_is_not_told_twice() -> None:
     assert "relative to statics" not in said and "1.5 times the static" in said
 
 
+def test_rounding_is_no_panel() -> None:
+    """A sway of 5e-20 m, across a track that nothing pushes across, was drawn beside millimetres."""
+    other = '[sensor.still]\nbody = "bed"\nat = 2.0'
+    dataset = scenes.run("passage", scenes.pace("passage"), extra=other)
+    for side in ("max", "min"):
+        dataset[f"still_{side}"].values[:] = [3e-20, 5e-20, 4e-20, 1e-20]
+    (figure,) = (one for one in answers.figures(dataset) if one.name == "largest-displacement")
+    assert "Not drawn: still, 0 m but for rounding." in figure.caption
+    assert not any("2 m of bed" in axes.get_ylabel() for axes in figure.drawing.axes)
+
+
 def test_level_lines_are_a_sentence() -> None:
     """Of sizes and amplifications that are the same all over, below another figure; drawn where there is a limit."""
     for question, is_drawn in (("", False), ('[question]\ndisplacement = "8 mm"', True)):

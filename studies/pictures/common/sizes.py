@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
 from results_schema.arrays import Array
-from studies.findings.amplification import largest, size_errors, sizes, told_amplification
+from studies.findings.amplification import largest, only_rounding, size_errors, sizes, told_amplification
 from studies.findings.effects import HARDLY, hardly_changed
 from studies.findings.in_step import WITH_MASSES, InStep, masses_ride, trains_in_step
 from studies.pictures.common.figures import FLAT, INK, Figure, draw, limit_far, limit_line, telling_limits
@@ -79,8 +79,11 @@ def told_flat(seen: View, sensors: list[str], limit: float | None) -> str:
 
 
 def _is_flat(seen: View, sensor: str) -> bool:
-    """Whether the sizes of a sensor change along the horizontal axis by no more than an eye sees; not of samples."""
+    """Whether the sizes of a sensor change along the horizontal axis by no more than an eye sees, not of samples, or
+    are rounding."""
     assert seen.x is not None
+    if only_rounding(seen.results, sensor):
+        return True
     size = seen.results.dataset["status"].copy(data=sizes(seen.results, sensor))
     top = float(np.nanmax(seen.plane(size), initial=0.0))
     return not seen.is_sampled and 0.0 < top * UNSEEN >= seen.most_along(seen.x, size)
@@ -134,6 +137,8 @@ def _told_gain(seen: View, sensor: str) -> str:
 def _told_flat(seen: View, sensor: str) -> str:
     """The sizes of a sensor that are no panel, as they hardly change along the horizontal axis."""
     assert seen.x is not None
+    if only_rounding(seen.results, sensor):
+        return f"Not drawn: {sensor.replace('_', ' ')}, {quantity(0.0, seen.results.sensors[sensor])} but for rounding."
     known = seen.plane(seen.results.dataset["status"].copy(data=sizes(seen.results, sensor)))
     ends = spanned(known[np.isfinite(known)], partial(quantity, units=seen.results.sensors[sensor]))
     same = f"the same within {percent(UNSEEN)} for {seen.x.noun} {seen.x.span}"
