@@ -257,8 +257,8 @@ def told_settling(results: Results, sensor: str, limit: float | None, axis: Axis
         said.append(f"it takes longer than {quantity(limit, 's')} {longer}")
     if (out := unknown & ~quiet).any():
         have = f"{counted(int(out.sum()), 'variant')} {'have' if out.sum() > 1 else 'has'} not settled by the end"
-        late = "or too late to tell that it is for good: a longer rest tells when"
-        said.append(f"{have} of the run{_over(results, out, axis)}, {late}")
+        late = "of the run, or too late to tell that it is for good"
+        said.append(f"{have} {late}{_over(results, out, axis)}: a longer rest tells when")
     if quiet.any():
         stay = f"{counted(int(quiet.sum()), 'variant')} {'stay' if quiet.sum() > 1 else 'stays'} {within}"
         said.append(f"{stay}{_over(results, quiet, axis)}, but the rest is too short to tell that it is for good")
