@@ -131,9 +131,11 @@ def _speed_ratio(plan: Plan) -> Array | None:
 
 
 def _mass_ratio(plan: Plan) -> Array | None:
-    """Mass of the first carriage over its body's."""
+    """Mass of the first carriage over its body's, where that has one."""
     first = next(iter(plan.study.carriage))
     if not plan.study.carriage[first].inertial:
+        return None
+    if not all(grid.scene.leading_body.modal.mass > 0.0 for grid in plan.grids):  # of matrices without one that way
         return None
     found = np.empty(plan.size)
     for grid, members in zip(plan.grids, plan.members, strict=True):

@@ -259,7 +259,7 @@ def _heavy(plan: Plan) -> Iterator[str]:
     ratios = [
         moving_mass(g.scene, g.values, number).max() / body.mass
         for g, number, body in _carriages(plan)
-        if not _weighs_with_unit(plan.study, g.scene.carriages[number].name)
+        if body.mass > 0.0 and not _weighs_with_unit(plan.study, g.scene.carriages[number].name)
     ]
     worst = max(ratios, default=0.0)
     if worst > HEAVY:

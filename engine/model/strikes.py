@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -23,6 +24,11 @@ class Strikes(NamedTuple):
     def masses_arrive(self) -> bool:
         """Whether contact forces tend to nothing by m_N/(m + m_N), m_N the mass of N modes where a mass m comes."""
         return self.arrive and self.unsprung
+
+
+def strikes_of_all(models: Iterable[SceneModel]) -> Strikes:
+    """How loads strike bodies in any of some scenes, as one says what the errors of all are told by."""
+    return Strikes(*(any(told) for told in zip(*map(strikes_of, models), strict=True)))
 
 
 def strikes_of(model: SceneModel) -> Strikes:

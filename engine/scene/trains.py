@@ -297,7 +297,7 @@ def axle_name(train: str, axle: int) -> str:
 
 def with_axles(document: Document) -> Document:
     """The document with a carriage for every axle, behind those that were written, and behind all that move those that
-    stand: the first one's way is what a study goes by. Raises BadInput.
+    stand, as the first one's way is what a study goes by, unless it lists places of its first one. Raises BadInput.
 
     Errors in such a carriage name the train. What is written of one, as where one axle is swept, stands above what the
     train says.
@@ -306,8 +306,10 @@ def with_axles(document: Document) -> Document:
     written = data.get("carriage", {})
     if not isinstance(written, dict):
         return document
+    question = data.get("question")
+    listed = isinstance(question, dict) and isinstance(question.get("positions"), list)
     if "train" not in data:
-        ordered = _standing_last(written)
+        ordered = written if listed else _standing_last(written)
         return document if list(ordered) == list(written) else Document(data | {"carriage": ordered}, source)
     try:
         trains = Trains(train=data["train"]).train
@@ -323,11 +325,12 @@ def with_axles(document: Document) -> Document:
             axles[own] = shared | train.numbers(axle) | motion
             trained_by[f"carriage.{own}"] = f"train.{name}"
     for name in axles:
-        if "kind" in written.get(name, {}):
+        if isinstance(written.get(name), dict) and "kind" in written[name]:
             here, what = f"carriage.{name}", "two carriages have this name"
             raise source.fault(here, what, received=f"an axle of {trained_by[here]}", remedy="another name")
-    carriages = _standing_last(_overlaid(written, axles))
-    return Document(data | {"carriage": carriages}, replace(source, written_as=trained_by))
+    carriages = _overlaid(written, axles)
+    ordered = carriages if listed else _standing_last(carriages)
+    return Document(data | {"carriage": ordered}, replace(source, written_as=trained_by))
 
 
 def _standing_last(carriages: Mapping[str, Any]) -> dict[str, Any]:
@@ -342,5 +345,9 @@ def _standing_last(carriages: Mapping[str, Any]) -> dict[str, Any]:
 
 def _overlaid(above: Mapping[str, Any], below: Mapping[str, Any]) -> dict[str, Any]:
     """One table of both; what stands in `above` comes first and counts."""
-    both = {key: _overlaid(above[key], below[key]) for key in above if isinstance(below.get(key), dict)}
+    both = {
+        key: _overlaid(above[key], below[key])
+        for key in above
+        if isinstance(below.get(key), dict) and isinstance(above[key], dict)
+    }
     return {**above, **{key: value for key, value in below.items() if key not in above}, **both}

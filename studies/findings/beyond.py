@@ -207,7 +207,8 @@ def where(results: Results, beyond: Mask, axis: Axis | None) -> str:
     """In which part of the sweep variants are beyond something, as of `where_beyond`; along what is swept alone too."""
     axis = results.axes[0] if axis is None and len(results.axes) == 1 else axis
     if not beyond.any() and sum(one.values.size > 1 for one in results.axes) > 1:
-        return "nowhere in the sweep"
+        known = int(np.count_nonzero(results.with_values))
+        return "nowhere in the sweep" if known == results.size else f"nowhere in the {known:,} variants that count"
     if axis is not None and VARIANT in results.dims and _has_samples(results, axis):
         return _in_parts(results, axis, beyond)
     if axis is None or axis.dim == VARIANT:
@@ -284,10 +285,7 @@ def _along(results: Results, axis: Axis, beyond: Mask, among: Mask | None = None
     if not over.any():
         if axis.sets(DIRECTION):
             return "neither way"
-        told = _values_of(results, axis, results.with_values if among is None else among & results.with_values)
-        if told.size == 1 < axis.values.size:
-            return f"nowhere, which is known at {axis.in_words(float(told[0]))} alone"
-        return f"nowhere from {axis.spans([told]) if told.size else axis.span}"
+        return f"nowhere {_known_along(results, axis, results.with_values if among is None else among)}"
     steps = _steps(places)
     apart = np.flatnonzero(over[:-1] & over[1:] & (steps > GAP * np.median(steps)))
     if over.all() and not apart.size:
@@ -304,6 +302,18 @@ def _along(results: Results, axis: Axis, beyond: Mask, among: Mask | None = None
         return f"{_at(axis, parts, end)}{whole}"
     first, last = (_at(axis, [part], end) for part in (parts[0], parts[-1]))
     return f"in {len(parts)} parts of the sweep, first {first}, last {last}{whole}"
+
+
+def _known_along(results: Results, axis: Axis, among: Mask) -> str:
+    """Along which values of a swept number anything counts: "from 8 to 20 m/s"."""
+    places = np.unique(axis.values)
+    told = np.isin(places, _values_of(results, axis, among & results.with_values))
+    if told.all() or not told.any():
+        return f"from {axis.span}"
+    turns = np.flatnonzero(np.diff(told, prepend=False, append=False))
+    parts = [places[first:end] for first, end in zip(turns[::2], turns[1::2], strict=True)]
+    each = [f"{'from' if part.size > 1 else 'at'} {axis.spans([part])}" for part in parts]
+    return f"{listed(each) if len(each) <= MOST_PARTS else f'from {axis.span}'}, where it is known"
 
 
 def _values_of(results: Results, axis: Axis, which: Mask) -> Array:

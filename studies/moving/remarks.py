@@ -126,20 +126,26 @@ def _goes_on(looked: Looked) -> Iterator[str]:
 
 
 def _stops_at_once(looked: Looked) -> Iterator[str]:
-    """Carriages with a mass whose given speed jumps before the march ends."""
-    study = looked.study
-    longest = max(float(sample.seconds.max()) for sample in looked.samples)
-    for name in driven(study):
-        carriage, motion = study.carriage[name], study.carriage[name].motion
-        end = motion.path(np.array([motion.duration]), "left")
-        jumps = [(one.tau, one.before) for one in motion.reversals()] + [(motion.duration, float(end.dS[0]))]
-        tau, before = next((jump for jump in jumps if jump[1] != 0.0), (np.inf, 0.0))
-        if carriage.inertial and carriage.start_time + tau * motion.time_scale < longest:
-            place, speed = float(motion.path(np.array([tau]), "left").S[0]), abs(before) / motion.time_scale
-            where = f"at {place:.4g} m of {carriage.on}, from {quantity(speed, 'm s-1')}"
+    """Carriages with a mass that a cruise carries until it ends on a body whose track moves along itself too, with the
+    largest speed."""
+    study, fastest = looked.study, dict[str, float]()
+    for model, values, seconds in looked.samples:
+        for name in driven(study):
+            carriage, motion = study.carriage[name], study.carriage[name].motion
+            end = motion.path(np.array([motion.duration]), "left")
+            fields = np.abs(model.bodies[carriage.on].fields(end.S, (0,))[0, 0])
+            gives_way = fields[0].max(initial=0.0) > ROUNDING * fields.max(initial=0.0)
+            if carriage.inertial and motion.passes and gives_way:
+                key = f"carriage.{name}.motion.{motion.pace}"
+                pace = values.column(key) / study.value(key) / motion.time_scale
+                stops = carriage.start_time + motion.duration / pace < seconds
+                speed = float(np.max(np.abs(end.dS) * pace, where=stops, initial=0.0))
+                fastest[name] = max(fastest.get(name, 0.0), speed)
+    for name, speed in fastest.items():
+        if speed > 0.0:
             yield (
-                f"{name} stops or turns within no time {where}: forces of its mass are then as large as steps are "
-                "short; waypoints let it brake"
+                f"{name} stops within no time at the end of its way, from up to {quantity(speed, 'm s-1')}, which "
+                "strikes its track along itself by a force as large as steps are short: waypoints let it brake"
             )
 
 

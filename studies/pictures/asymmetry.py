@@ -68,7 +68,8 @@ def _known(results: Results, sensors: list[str], name: str, more: str) -> tuple[
     """The sensors that have a result anywhere, or the first one, and in a sentence which have none."""
     known = [sensor for sensor in sensors if np.isfinite(results.numbers(name, sensor)).any()] or sensors[:1]
     left = [sensor for sensor in sensors if sensor not in known]
-    return known, f"{more} Not known of {listed(left)}, which at rest reads the same all the way." if left else more
+    told = f"Not known of {listed(left)}: at rest nothing changes there on the way." if left else ""
+    return known, " ".join(filter(None, (more, told)))
 
 
 def _odd_where_settled(results: Results, sensor: str) -> Array:

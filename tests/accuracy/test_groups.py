@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import engine
 from engine.accuracy.grids import SceneGrid
 from engine.accuracy.groups import ConvergingGroup, Found, MarchGroup
 from engine.accuracy.results import Result, differences, results_of, tolerances, worst_held
@@ -288,6 +289,19 @@ def test_what_loads_strike_at_once_is_told_where_it_hardly_converges(
     told = {result.name for result in results_of(plan.asked) if np.isnan(result.tolerance)}
     struck = {"reaction", "reaction_max", "reaction_min", "reaction_rms", "moment"}
     assert told & {*struck, "place", "moment_max", "asked", "asked_max"} == (struck if at_once else set())
+
+
+def test_what_strikes_in_some_scenes_is_told_in_all_as_alone() -> None:
+    """Of a force that leaves a free end with nothing after it, and with free vibration: the first one decided."""
+    sensor, last = {"counted": fixed(0.5, "acceleration")}, cruise(0.0, 1.0, 1.0)
+    given = study(beam(supports="clamped-free"), mass(0.1, last), sensor=sensor, solver={"tolerance": 1e-2})
+    swept = {"sweep": {"a": {"of": "carriage.car.motion.after", "values": [0.0, 1.0]}}}
+    found, alone = (
+        engine.run(given.with_values(swept)),
+        engine.run(given.with_values({"carriage.car.motion.after": 1.0})),
+    )
+    told = found.estimated_error.sel(result="counted_rms").values
+    assert told[1] == float(alone.estimated_error.sel(result="counted_rms")) > 3.0 * told[0]
 
 
 @pytest.mark.parametrize(

@@ -70,6 +70,8 @@ def test_what_moves_comes_before_what_stands() -> None:
     }
     given = study(beam(), carriages)
     assert list(given.carriage) == ["first", "second", "absorber"] and given.clock == "first"
+    placed = given.with_values({"kind": "influence", "question": {"positions": [0.2, 0.5]}})
+    assert list(placed.carriage) == list(carriages)
     assert float(engine.run(given).midspan_max_position) == pytest.approx(0.445, abs=0.02)
 
 

@@ -98,7 +98,7 @@ def test_panels_without_a_lag_are_left_out() -> None:
     told = {figure.name: figure for figure in answers.figures(dataset)}
     for name, panels in (("lag", 1), ("odd-and-even", 2)):
         assert len(told[name].drawing.axes) == panels
-        assert "Not known of moment, which at rest reads the same all the way." in told[name].caption
+        assert "Not known of moment: at rest nothing changes there on the way." in told[name].caption
 
 
 def test_unsorted_axes_are_drawn_in_order() -> None:

@@ -218,6 +218,11 @@ def test_one_variant_as_a_study_of_its_own() -> None:
             ["carriage.tram_2", "two carriages", "train.tram"],
         ),
         (
+            "[sensor.midspan]",
+            "[carriage]\ntram_2 = 5\n[sensor.midspan]",
+            ["train.tram: a table is wanted", "received 5"],
+        ),
+        (
             "[sweep]",
             '[sweep]\nall = { of = "carriage.tram_2.motion.speed", values = [1] }',
             ["sweep.all.of", "moves with its train"],

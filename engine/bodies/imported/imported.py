@@ -198,9 +198,10 @@ class Imported(Body):
         if spot.node is None or self.recorded is not None:
             return
         if spot.node not in self.model.nodes:
-            remedy = f"{spot.node} without quotes" if str(spot.node).isdecimal() and isinstance(spot.node, str) else ""
-            what, received = "there is no such node", repr(spot.node) if remedy else shortened(spot.node)
-            raise BadInput(what, where="node", expected=self.model.numbered, received=received, remedy=remedy)
+            quoted = isinstance(spot.node, str) and spot.node in map(str, self.model.nodes.tolist())
+            remedy = f"{spot.node} without quotes" * quoted
+            what, told = "there is no such node", self.model.numbered
+            raise BadInput(what, where="node", expected=told, received=shortened(spot.node), remedy=remedy)
         place = int(np.flatnonzero(self.model.nodes == spot.node)[0])
         if not self._moves(place, unit(self.gravity_direction if spot.direction is None else spot.direction)):
             what = f"node {spot.node} does not move in this direction"

@@ -132,6 +132,7 @@ def faults(folder: Path, files: Files) -> dict[str, tuple[dict[str, Any], list[s
         "other form": ({"mass": stored("dia.npz", dia_array(np.eye(96)))}, ["dia (96, 96)", "save_npz(path"]),
         "arrays": ({"mass": arrays()}, ["arrays of numpy", '"K"', "save_npz(path"]),
         "columns": ({"nodes": written("n.csv", "node,y,x,z", *nodes)}, ["line 1", "another order", "node, x, y, z"]),
+        "other words": ({"nodes": written("n.csv", "id,y,x,z", *nodes)}, ["line 1", "another order"]),
         "from 0": ({"freedoms": written("f.csv", "1,0", "1,1")}, ["line 1", "no such direction", "1 to 6"]),
         "a row short": ({"freedoms": written("f.csv", *rows[:-1])}, ["the 95 degrees", "f.csv", "95 x 95", "96 x 96"]),
         "narrow": ({"recovery": written("r.mtx", *NARROW), "stress_rows": [[1]] * 17}, ["recovery", "96 columns", "2"]),

@@ -19,6 +19,8 @@ HUNG = {"arm": {"joints": [TURN]}, "tool": {"on": "arm"}}
 HINGE = {"kind": "revolute", "axis": [0, 1, 0]}
 SPIN = {"kind": "revolute", "axis": [0, 1, 0], "motion": {"kind": "spin-up", "rate": 0.1, "time": 2.0}}
 SLIDE = {"kind": "prismatic", "axis": [0, 1, 0], "motion": {"kind": "waypoints", "times": [0, 1], "values": [0, 0.1]}}
+STRETCHED = {"arm": {"joints": [TURN], "axial_modes": 2}}
+SPEEDS = {"v": {"of": "carriage.trolley.motion.speed", "values": [4.0, 24.0]}}
 LATER = TURN | {"motion": {"kind": "waypoints", "times": [0, 1.5], "values": [0, -0.1]}}
 ASIDE = {"body": "arm", "at": 10.0, "quantity": "position_error", "direction": "y"}
 MOMENT = {"quantity": "bending_moment"}
@@ -52,8 +54,8 @@ SAID = {
     "frame.arm.joints.0.motion goes on until 1.5 s, and the march ends at 1 s": driven(joints=[LATER]),
     "frame.arm.joints.0.motion goes on until 2 s, and the march ends at 1 s": driven(joints=[SPIN]),
     "carriage.trolley.motion goes on until 4 s, and the march ends at 1 s": driven({"speed": 2.0}),
-    "trolley stops or turns within no time at 8 m of arm, from 12 m/s: forces of its mass are then as": driven(
-        {"kind": "cruise", "start": 2.0, "end": 8.0, "speed": 12.0}
+    "trolley stops within no time at the end of its way, from up to 24 m/s, which strikes its track along": driven(
+        {"end": 8.0, "speed": 4.0}, frame=STRETCHED, sweep=SPEEDS
     ),
     "no body has a joint, so that all frames stand still": driven(joints=()),
     "nothing moves tool, which stands on the ground without a joint, and nothing rides or hangs on it": with_tool(),
@@ -103,4 +105,6 @@ def test_nothing_is_remarked_of_ordinary_studies() -> None:
     assert KIND.remarks(heavy(frame={"arm": {"joints": [TURN], "turned": [0, "90 deg", 0]}})) == ()  # upright
     pinned = driven(arm={"supports": "pinned-free"}, joints=[HINGE])
     assert KIND.remarks(pinned) == KIND.remarks(driven(joints=[HINGE | {"stiffness": 1e4}])) == ()
+    assert KIND.remarks(driven({"end": 8.0, "speed": 7.0}, frame=STRETCHED)) == ()  # when the run has ended
+    assert KIND.remarks(driven({"end": 8.0, "speed": 12.0})) == ()  # nothing gives way along the track
     assert len(REMARKS) == 12
