@@ -133,9 +133,7 @@ def _stops_at_once(looked: Looked) -> Iterator[str]:
         for name in driven(study):
             carriage, motion = study.carriage[name], study.carriage[name].motion
             end = motion.path(np.array([motion.duration]), "left")
-            fields = np.abs(model.bodies[carriage.on].fields(end.S, (0,))[0, 0])
-            gives_way = fields[0].max(initial=0.0) > ROUNDING * fields.max(initial=0.0)
-            if carriage.inertial and motion.passes and gives_way:
+            if carriage.inertial and motion.passes and _moves_along(model.bodies[carriage.on], float(end.S[0])):
                 key = f"carriage.{name}.motion.{motion.pace}"
                 pace = values.column(key) / study.value(key) / motion.time_scale
                 stops = carriage.start_time + motion.duration / pace < seconds
@@ -147,6 +145,14 @@ def _stops_at_once(looked: Looked) -> Iterator[str]:
                 f"{name} stops within no time at the end of its way, from up to {quantity(speed, 'm s-1')}, which "
                 "strikes its track along itself by a force as large as steps are short: waypoints let it brake"
             )
+
+
+def _moves_along(body: ElasticBody, x: float) -> bool:
+    """Whether a place is on a body's track, which moves along itself there."""
+    if not 0.0 <= x <= body.length:
+        return False
+    fields = np.abs(body.fields(np.array([x]), (0,))[0, 0])
+    return bool(fields[0].max(initial=0.0) > ROUNDING * fields.max(initial=0.0))
 
 
 def _stands(looked: Looked) -> Iterator[str]:
