@@ -56,10 +56,15 @@ def of_what_matters(plan: Plan, variants: Counts) -> tuple[Array, Array]:
 
 
 @pytest.mark.parametrize(
-    "scene", ["gantry", *(pytest.param(one, marks=pytest.mark.slow) for one in ("bridge of two spans", "jib"))]
+    ("scene", "last"),
+    [
+        ("gantry", 9),
+        pytest.param("bridge of two spans", 9, marks=pytest.mark.slow),
+        pytest.param("jib", 15, marks=pytest.mark.slow),  # of whose accelerations few are known well enough
+    ],
 )
-def test_told_errors_of_frames_are_above_those_beside_many_elements(scene: str) -> None:
-    plans = [make_plan(draw(SEED, number, 4, TOLERANCE)) for number in range(SCENES[scene], 9, len(SCENES))]
+def test_told_errors_of_frames_are_above_those_beside_many_elements(scene: str, last: int) -> None:
+    plans = [make_plan(draw(SEED, number, 4, TOLERANCE)) for number in range(SCENES[scene], last, len(SCENES))]
     told, true = np.concatenate([of_what_matters(plan, np.arange(plan.size)) for plan in plans], axis=1)
     assert true.size > 15 and true.max() > 5.0 * TOLERANCE
     assert np.mean(told >= true) > 0.97 and np.median(told / true) < 3.0
