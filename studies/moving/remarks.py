@@ -133,7 +133,8 @@ def _stops_at_once(looked: Looked) -> Iterator[str]:
         for name in driven(study):
             carriage, motion = study.carriage[name], study.carriage[name].motion
             end = motion.path(np.array([motion.duration]), "left")
-            if carriage.inertial and motion.passes and _moves_along(model.bodies[carriage.on], float(end.S[0])):
+            ends = motion.passes and motion.pace is not None  # a cruise, or what a package brings that is like one
+            if ends and carriage.inertial and _moves_along(model.bodies[carriage.on], float(end.S[0])):
                 key = f"carriage.{name}.motion.{motion.pace}"
                 pace = values.column(key) / study.value(key) / motion.time_scale
                 stops = carriage.start_time + motion.duration / pace < seconds
