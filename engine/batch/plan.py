@@ -30,7 +30,7 @@ from engine.march.tables import SceneTables
 from engine.model.distinct_models import base_scene, scenes
 from engine.model.refusals import check_moves
 from engine.model.scene_model import SceneModel
-from engine.model.strikes import strikes_of_all
+from engine.model.strikes import strikes_of, strikes_of_all
 from engine.model.timeline import Window
 from engine.observation.cycle_reduction import Reduction
 from engine.observation.histories import CYCLE_STATIONS, REST_STATIONS, WHOLE_STATIONS, counts_shown
@@ -285,8 +285,9 @@ def make_plan(
     window: Window = "whole" if reduction is None else "last-cycle"
     accelerated = "{carriage}_acceleration_across" in {variable.name for variable in declarations(results)}
     base = base_scene(study)
-    asked = Asked(study, reduction, window, accelerated, strikes_of_all([base]))
+    asked = Asked(study, reduction, window, accelerated, strikes_of(base))
     check_memory(study, cases.size, min(IN_MEMORY, 8 * cases.size * numbers_per_variant(asked)))
+    # how loads strike is known when all scenes are built, which memory is looked at before
     every = list(scenes(study, cases, np.arange(cases.size, dtype=np.int64)))
     asked = replace(asked, strikes=strikes_of_all(scene for scene, _ in every))
     grids, members = [], []

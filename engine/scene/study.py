@@ -22,7 +22,7 @@ from engine.scene.references import check_names, check_references
 from engine.scene.robots import Arm, Robot, limit_checks
 from engine.scene.sensors import Envelope, Sensor
 from engine.scene.settings import Output, Solver, Sweep
-from engine.scene.trains import Trains, axle_name, with_axles
+from engine.scene.trains import Trains, axle_name, moving_first, with_axles
 from engine.study_file.checks import Check, on_body
 from engine.study_file.document import Document, Source, document_of, read_document
 from engine.study_file.refusals import field_at, refuse
@@ -98,7 +98,7 @@ class Study(Scene):
         if not isinstance(document, Document | None):
             raise _no_study(document, "keywords such as kind and body")
         given = document if document is not None else document_of({"schema_version": SCHEMA_VERSION, **keywords})
-        whole = with_axles(given)
+        whole = moving_first(with_axles(given))
         try:
             super().__init__(**whole.data)
         except ValidationError as error:

@@ -296,21 +296,15 @@ def axle_name(train: str, axle: int) -> str:
 
 
 def with_axles(document: Document) -> Document:
-    """The document with a carriage for every axle, behind those that were written, and behind all that move those that
-    stand, as the first one's way is what a study goes by, unless it lists places of its first one. Raises BadInput.
+    """The document with a carriage for every axle, behind those that were written. Raises BadInput.
 
     Errors in such a carriage name the train. What is written of one, as where one axle is swept, stands above what the
     train says.
     """
     data, source = document.data, document.source
     written = data.get("carriage", {})
-    if not isinstance(written, dict):
+    if "train" not in data or not isinstance(written, dict):
         return document
-    question = data.get("question")
-    listed = isinstance(question, dict) and isinstance(question.get("positions"), list)
-    if "train" not in data:
-        ordered = written if listed else _standing_last(written)
-        return document if list(ordered) == list(written) else Document(data | {"carriage": ordered}, source)
     try:
         trains = Trains(train=data["train"]).train
     except ValidationError as error:
@@ -328,19 +322,24 @@ def with_axles(document: Document) -> Document:
         if isinstance(written.get(name), dict) and "kind" in written[name]:
             here, what = f"carriage.{name}", "two carriages have this name"
             raise source.fault(here, what, received=f"an axle of {trained_by[here]}", remedy="another name")
-    carriages = _overlaid(written, axles)
-    ordered = carriages if listed else _standing_last(carriages)
-    return Document(data | {"carriage": ordered}, replace(source, written_as=trained_by))
+    return Document(data | {"carriage": _overlaid(written, axles)}, replace(source, written_as=trained_by))
 
 
-def _standing_last(carriages: Mapping[str, Any]) -> dict[str, Any]:
-    """The carriages as they were written, but for those that stand."""
+def moving_first(document: Document) -> Document:
+    """The document with carriages that stand behind those that move, as places are told and steps counted by the way of
+    the first one; as it was written where a study at rest lists the places of that."""
+    data = document.data
+    carriages, question = data.get("carriage"), data.get("question")
+    if not isinstance(carriages, dict) or (isinstance(question, dict) and isinstance(question.get("positions"), list)):
+        return document
+    ordered = {name: carriages[name] for name in sorted(carriages, key=lambda name: _stands(carriages[name]))}
+    return Document(data | {"carriage": ordered}, document.source)
 
-    def stands(name: str) -> bool:
-        motion = carriages[name].get("motion") if isinstance(carriages[name], dict) else None
-        return isinstance(motion, dict) and motion.get("kind") in get_args(Standing.model_fields["kind"].annotation)
 
-    return {name: carriages[name] for name in sorted(carriages, key=stands)}
+def _stands(carriage: object) -> bool:
+    """Whether a table, as it was written, is that of a carriage that stands."""
+    motion = carriage.get("motion") if isinstance(carriage, dict) else None
+    return isinstance(motion, dict) and motion.get("kind") in get_args(Standing.model_fields["kind"].annotation)
 
 
 def _overlaid(above: Mapping[str, Any], below: Mapping[str, Any]) -> dict[str, Any]:

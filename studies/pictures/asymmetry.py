@@ -65,11 +65,12 @@ def pictures(results: Results) -> list[Figure]:
 
 
 def _known(results: Results, sensors: list[str], name: str, more: str) -> tuple[list[str], str]:
-    """The sensors that have a result anywhere, or the first one, and in a sentence which have none."""
-    known = [sensor for sensor in sensors if np.isfinite(results.numbers(name, sensor)).any()] or sensors[:1]
+    """The sensors that have a result anywhere, and in a sentence which have none; all of them where none has."""
+    known = [sensor for sensor in sensors if np.isfinite(results.numbers(name, sensor)).any()]
     left = [sensor for sensor in sensors if sensor not in known]
-    told = f"Not known of {listed(left)}: at rest nothing changes there on the way." if left else ""
-    return known, " ".join(filter(None, (more, told)))
+    if not known or not left:
+        return sensors, more
+    return known, f"{more} Not known of {listed(left)}: at rest nothing changes there on the way.".strip()
 
 
 def _odd_where_settled(results: Results, sensor: str) -> Array:

@@ -198,8 +198,7 @@ class Imported(Body):
         if spot.node is None or self.recorded is not None:
             return
         if spot.node not in self.model.nodes:
-            quoted = isinstance(spot.node, str) and spot.node in map(str, self.model.nodes.tolist())
-            remedy = f"{spot.node} without quotes" * quoted
+            remedy = f"{spot.node} without quotes" * (str(spot.node) in map(str, self.model.nodes.tolist()))
             what, told = "there is no such node", self.model.numbered
             raise BadInput(what, where="node", expected=told, received=shortened(spot.node), remedy=remedy)
         place = int(np.flatnonzero(self.model.nodes == spot.node)[0])
