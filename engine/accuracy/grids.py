@@ -181,10 +181,8 @@ class SceneGrid:
             corrected = self.scene.numerics._replace(fidelity=numerics.fidelity, static_correction=True)
             teller = self.model(corrected) if numerics.static_correction else model
             sensors = SceneTables(teller, self.unit, self.asked.window, self.readings).sensors
-            found = Statics(teller, timeline, sensors)
-            if by != (1, 1):
-                found.over_window = self._statics(model, (1, 1), self.grid.timeline(1, 1)).over_window
-            self._readings[key] = found
+            coarser = None if by == (1, 1) else self._statics(model, (1, 1), self.grid.timeline(1, 1))
+            self._readings[key] = Statics(teller, timeline, sensors, coarser, by)
         return self._readings[key]
 
     def stations(self, model: SceneModel, by: int) -> Counts:

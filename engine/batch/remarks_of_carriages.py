@@ -233,7 +233,9 @@ def _yields_far(plan: Plan) -> Iterator[str]:
             most = YIELDS * grid.scene.bodies[tie.rides].modal.length
             contacts = grid.scene.study.carriage[tie.name].riding_contacts
             for (name, contact), load in zip(contacts.items(), tie.loads, strict=True):
-                sunk = load.share * heaviest / contact.spring
+                key = SpringKeys.of_contact(tie.name, name).stiffness
+                softest = np.inf if contact.is_rigid else float(grid.values.column(key).min())
+                sunk = load.share * heaviest / softest
                 if sunk > most:
                     found[tie.name, name] = max(sunk, found.get((tie.name, name), 0.0))
     for (carriage, name), sunk in found.items():

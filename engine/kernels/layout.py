@@ -59,7 +59,8 @@ class Lanes(NamedTuple):
     for a coordinate that is the place of a mass m;
     coupling_mass (blocks, ties, LANES): m (kg), or c h for a damper;
     coupling_stiffness (blocks, ties, LANES): k h^2 of a spring;
-    load (blocks, ties, LANES): the tie's dead load times h^2;  weight (blocks, carriages, LANES): N;
+    load (blocks, ties, LANES): the tie's dead load times h^2;  weight (blocks, carriages, LANES): N, and
+    times what contacts are softer by than their model's, as many more for each of these;
     gravity, step (blocks, LANES): m/s^2, and h in s.
     """
 
@@ -94,8 +95,8 @@ class Observation(NamedTuple):
 
     on_q, on_v, on_a (1 or stations, modes, channels);  signal (channels): which signal a channel adds to;
     order (channels): the power of 1/h that makes it SI;  static (stations, signals, ties): deflection per unit
-    force that the kept modes miss, and where signals are dynamic parts as many columns more as there are carriages:
-    less what they leave out per unit weight of each;  offset (stations, signals): per unit gravity, in step units of
+    force that the kept modes miss, and where signals are dynamic parts as many columns more as there are weights:
+    less what they leave out per unit of each;  offset (stations, signals): per unit gravity, in step units of
     offset_order (signals), the power of 1/h that makes it SI;
     counted (stations, signals): whether the station enters extremes.
     summed (signals): whether squares are summed over time, which wants a signal that counts all along the segment.

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -33,6 +34,7 @@ class Scheme(Protocol):
     at once.
     """
 
+    def __hash__(self) -> int: ...
     @property
     def name(self) -> str: ...
     @property
@@ -226,11 +228,13 @@ class AlphaScheme:
         return np.asarray(2.0 * np.arctan(0.5 * x))
 
 
+@lru_cache(maxsize=64)
 def is_damped(scheme: Scheme) -> bool:
     """Whether it damps high frequencies so much that a moving mass needs no alias rule."""
     return float(np.abs(np.linalg.eigvals(scheme.amplification(_JUDGED_AT))).max()) <= _DAMPED
 
 
+@lru_cache(maxsize=64)
 def damps_contacts(scheme: Scheme) -> bool:
     """Whether it damps what is far faster than its step so much that steps may be longer than periods of contacts."""
     return float(np.abs(np.linalg.eigvals(scheme.amplification(_FAR_BEYOND))).max()) <= _DAMPED_CONTACTS

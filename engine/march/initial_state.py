@@ -33,10 +33,10 @@ def initial_state(model: SceneModel, lanes: LaneTable) -> State:
             q[:, part.modes] = -sag[:, None] * lanes.gravity[:, None]
     along = _first_places(model)
     if model.study.start == "equilibrium":
-        found, count = _coordinates(model, along, static_state(model, along)), len(model.carriages)
-        for load in range(count):
-            q += found[:, load, None] * lanes.weight[:, load, None]
-        q += found[:, count, None] * lanes.gravity[:, None]
+        found = _coordinates(model, along, static_state(model, along))
+        for load in range(lanes.of_carriages.shape[1]):
+            q += found[:, load, None] * lanes.of_carriages[:, load, None]
+        q += found[:, -1, None] * lanes.gravity[:, None]
     if model.has_constant:
         q[:, -1] = 1.0
     if model.pulsating:
@@ -56,7 +56,7 @@ def _first_places(model: SceneModel) -> Along:
 
 
 def _coordinates(model: SceneModel, along: Along, state: StaticState) -> Array:
-    """(N, L) static modal coordinates per unit weight of each carriage and per unit gravity."""
+    """(N, L) static modal coordinates per unit of each of `lane_table.static_loads`."""
     found = np.zeros((model.omega.size, state.force.shape[2]))
     for r, attachments in enumerate(model.attachments):
         for attachment in attachments:

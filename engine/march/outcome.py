@@ -18,7 +18,7 @@ from engine.march.rest import counts_settling, elapsed, residuals, seconds_at, s
 from engine.march.richardson import march_scheme
 from engine.march.step_rules import between_stations
 from engine.march.tables import SceneTables
-from engine.model.lane_table import in_whole_blocks, weight, weights
+from engine.model.lane_table import in_whole_blocks, loads_of, static_loads, weight, weights
 from engine.model.scene_model import SceneModel
 from engine.model.strikes import Strikes
 from engine.model.timeline import Window
@@ -282,14 +282,14 @@ def _status(model: SceneModel, marched: Marched) -> tuple[NDArray[np.int8], NDAr
 def _statics(tables: SceneTables, values: VariantValues) -> Flat:
     """The largest absolute static reading of every sensor while the carriages go their way, by the same model; 0 where
     that is rounding."""
-    unit = tables.statics.over_window
-    loads, gravity, least = weights(tables.model, values), values.gravity, _least_static(tables, values)
+    unit, loads, least = tables.statics.over_window, static_loads(tables.model, values), _least_static(tables, values)
     found: Flat = {}
     for j, sensor in enumerate(tables.sensors[: len(tables.model.study.sensor)]):
-        if loads.shape[0] == 1 and not np.any(unit.gravity[:, j]):
-            static = np.abs(unit.force[:, j, 0]).max() * np.abs(loads[0])
+        read = np.flatnonzero(np.any(unit[:, j] != 0.0, axis=0))
+        if read.size == 1:
+            static = np.abs(unit[:, j, read[0]]).max() * np.abs(loads[read[0]])
         else:
-            static = _largest_static(unit.force[:, j], unit.gravity[:, j], loads, gravity)
+            static = _largest_static(unit[:, j, read], loads[read])
         found[f"{sensor.name}_static"] = np.where((static > least[:, j]) & (j not in tables.silent), static, 0.0)
     return found
 
@@ -299,14 +299,14 @@ def _least_static(tables: SceneTables, values: VariantValues) -> Array:
     return np.outer(np.abs(weights(tables.model, values)).sum(axis=0), STILL * tables.static_scales)
 
 
-def _largest_static(force: Array, offset: Array, loads: Array, gravity: Array) -> Array:
-    """(V,) largest |sum of unit readings times weights + offset times gravity|, in pieces of variants."""
-    found = np.empty(gravity.size)
-    for first in range(0, gravity.size, 1024):
+def _largest_static(unit: Array, loads: Array) -> Array:
+    """(V,) largest |sum of unit readings (H, L) times loads (L, V)|, in pieces of variants."""
+    found = np.empty(loads.shape[1])
+    for first in range(0, found.size, 1024):
         part = slice(first, first + 1024)
-        reading = offset[:, None] * gravity[part]
-        for r in range(loads.shape[0]):
-            reading = reading + force[:, r, None] * loads[r, part]
+        reading = np.zeros((len(unit), found[part].size))
+        for own, load in zip(unit.T, loads[:, part], strict=True):
+            reading += own[:, None] * load
         found[part] = np.abs(reading).max(axis=0)
     return found
 
@@ -364,24 +364,35 @@ def _reduced(
     """The study's own results (V, ...) from histories (H, J, V) of its cycle; none where it has no such."""
     if reduction is None:
         return {}
-    loads, tau = weights(tables.model, values), tables.timeline.moments(counts)[1]
+    tau = tables.timeline.moments(counts)[1]
     cycle = Cycle(
         phase=(tau - tau[0]) / (tau[-1] - tau[0]),
         position=tables.timeline.positions(0, counts.astype(np.float64)),
         history=history,
         motion=tables.model.clock,
         find_static=lambda: _static_histories(tables, values, counts),
-        find_slope=lambda: tables.statics.slope_at(counts)[:, :, None] * loads[0],
+        find_slope=lambda: _static_slopes(tables, values, counts),
     )
     return dict(reduction(cycle))
 
 
 def _static_histories(tables: SceneTables, values: VariantValues, counts: Counts) -> Array:
     """(H, J, V) static readings of the sensors at stations by their count."""
-    unit, loads = tables.statics.at(counts), weights(tables.model, values)
-    found = unit.gravity[:, :, None] * values.gravity
-    for r in range(loads.shape[0]):
-        found = found + unit.force[:, :, r, None] * loads[r]
+    return _of_loads(tables.statics.at(counts), static_loads(tables.model, values))
+
+
+def _static_slopes(tables: SceneTables, values: VariantValues, counts: Counts) -> Array:
+    """(H, J, V) their derivative by the position of the first carriage, as far as its own weight makes it."""
+    loads = weights(tables.model, values)
+    loads[1:] = 0.0
+    return _of_loads(tables.statics.slope_at(counts)[:, :, :-1], loads_of(tables.model, values, loads))
+
+
+def _of_loads(unit: Array, loads: Array) -> Array:
+    """(H, J, V) readings (H, J, L) per unit of loads (L, V) under all of them."""
+    found = np.zeros((*unit.shape[:2], loads.shape[1]))
+    for number, load in enumerate(loads):
+        found += unit[:, :, number, None] * load
     return found
 
 

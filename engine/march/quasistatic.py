@@ -12,7 +12,7 @@ import numpy as np
 
 from engine.kernels import layout
 from engine.march.march import Marched
-from engine.model.lane_table import weights
+from engine.model.lane_table import static_loads
 from engine.model.station_path import standing
 from engine.statics.static_response import static_readings
 from results_schema.arrays import Array, Counts, Mask
@@ -33,7 +33,7 @@ def quasistatic_extremes(
     """What a march of the first ``size`` variants would leave if it were infinitely slow: statistics, and histories of
     the first ``sampled`` signals, or of the sensors, at stations by their count."""
     model, signals = tables.model, tables.signals
-    loads = np.stack([*weights(model, values), values.gravity])[:, :size]
+    loads = static_loads(model, values)[:, :size]
     at = tables.statics.counts
     unit, counted = _unit(tables, at), _counted(tables, signals, standing(tables.timeline, at))
     distinct, inverse = np.unique(loads, axis=1, return_inverse=True)  # pace and damping do not count
@@ -61,7 +61,7 @@ def quasistatic_extremes(
 
 
 def _unit(tables: SceneTables, counts: Array | Counts) -> Array:
-    """(S, J, C + 1) readings of all signals per unit weight of each carriage, and last per unit gravity."""
+    """(S, J, L) readings of all signals per unit of each of the loads."""
     model = tables.model
     readers = [signal.as_sensor(model) for signal in tables.signals]
     return static_readings(model, readers, standing(tables.timeline, counts))

@@ -11,7 +11,7 @@ import numpy as np
 
 from engine.kernels import layout
 from engine.march.settling import STILL, names_of_times, parts_of_bands, split
-from engine.model.lane_table import weights
+from engine.model.lane_table import static_loads
 from engine.model.scene_model import with_numerics
 from engine.model.station_path import standing
 from engine.observation.histories import counts_at_rest
@@ -166,8 +166,7 @@ def last_beyond(off: Array, bands: Array, seconds: Array) -> Array:
 def _static(tables: SceneTables, values: VariantValues) -> Array:
     """(J, V) static readings of the sensors where all carriages rest."""
     unit, count = tables.statics.at(tables.at_rest), len(tables.model.study.sensor)
-    static = unit.force[0, :count] @ weights(tables.model, values) + unit.gravity[0, :count, None] * values.gravity
-    return np.asarray(static)
+    return np.asarray(unit[0, :count] @ static_loads(tables.model, values))
 
 
 def elapsed(tables: SceneTables, counts: Counts, time_scale: Array) -> Array:

@@ -39,7 +39,6 @@ LIMIT_MARGIN = 1.05  # a conditionally stable scheme stays this far inside its l
 LEAST_MARGIN = 1.1
 MOST_STEPS = 100_000_000  # over one passage or cycle: a variant of so many takes minutes
 SLOWEST = 200  # steps per first period that a study whose steps are open must be able to take within that
-TRACK_PLACES = 257  # along the track, at which the mobility is looked for: four in a wave of 64 modes
 ALIAS_CELL = 0.01  # of a time scale: the alias rule is solved once for variants that are no further apart
 
 
@@ -240,8 +239,7 @@ def _contact_square(model: SceneModel, values: VariantValues, spring: SpringTie)
     if spring.rigid:
         return np.zeros(values.size)
     body = model.bodies[spring.body].modal
-    mobility = float(np.max(np.sum(body.shape(np.linspace(0.0, body.length, TRACK_PLACES)) ** 2, axis=1)))
-    stiffness = values.column(spring.keys.stiffness)
+    mobility, stiffness = body.mobility, values.column(spring.keys.stiffness)
     if spring.held is not None:
         held = model.bodies[spring.held.body]
         above = spring.held.fixed_row(held.modal) ** 2 @ values.mobility(held.name, held.modal.omega.size)

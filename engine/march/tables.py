@@ -234,12 +234,9 @@ class SceneTables:
     def static_scales(self) -> Array:
         """(sensors,) a sensor's largest static reading per unit force anywhere on its body; of a rate that of the
         displacement times powers of the highest frequency kept."""
-        found = []
-        for sensor in self.sensors:
-            body = self.model.bodies[sensor.body].modal
-            largest = sensor.largest_influence(self.model, np.linspace(0.0, body.length, 65))
-            found.append(largest * body.omega.max() ** sensor.offset_order)
-        return np.array(found)
+        highest = np.array([self.model.bodies[sensor.body].modal.omega.max() for sensor in self.sensors])
+        orders = np.array([sensor.offset_order for sensor in self.sensors])
+        return np.asarray(self.statics.largest_influences * highest**orders)
 
 
 def _key(segment: Segment) -> SegmentKey:

@@ -44,6 +44,24 @@ def weights(model: SceneModel, values: VariantValues) -> Array:
     return np.stack([weight(model, values, number) for number in range(len(model.carriages))])
 
 
+def static_loads(model: SceneModel, values: VariantValues) -> Array:
+    """(L, V) what static readings grow with: `loads_of` all carriages, and last gravity in m/s^2."""
+    return np.concatenate([loads_of(model, values, weights(model, values)), values.gravity[None]])
+
+
+def loads_of(model: SceneModel, values: VariantValues, heavy: Array) -> Array:
+    """(C (1 + R), V) weights (C, V) of the carriages in N, and for each of the R contacts with lanes' own stiffnesses
+    the same times how much softer it is than the model's, in m: it carries what it carries, and yields by as much."""
+    softer = [_softer(model, values, number) for number in model.varying]
+    return np.concatenate([heavy, *(heavy * own for own in softer)])
+
+
+def _softer(model: SceneModel, values: VariantValues, spring: int) -> Array:
+    """(V,) m/N."""
+    key = model.springs[spring].keys.stiffness
+    return np.asarray(1.0 / values.column(key) - 1.0 / float(model.study.value(key)))
+
+
 def padded(variants: NDArray[np.int64]) -> NDArray[np.int64]:
     """Variants filled up to whole blocks by repeating the last one."""
     return np.pad(variants, (0, -variants.size % LANES), mode="edge")
@@ -76,7 +94,7 @@ class LaneTable:
     (blocks, ties, LANES): of the carriages, zero for dampers and springs, mass only what touches the body and has
     inertia;  joint (blocks, ties, LANES): 1 for rigid joints;  damper, spring (blocks, ties, LANES): N s/m and N/m,
     zero for carriages;  pulse (blocks, ties, LANES): N, amplitudes of forces that pulsate;  phase (blocks, P,
-    LANES): rad, of what they swing by;  of_carriages (blocks, carriages, LANES): N, their weights alone;
+    LANES): rad, of what they swing by;  of_carriages (blocks, C (1 + R), LANES): of `loads_of` their weights;
     time_scale, gravity (blocks, LANES).
     """
 
@@ -145,7 +163,7 @@ def lane_table(model: SceneModel, values: VariantValues) -> LaneTable:
         spring=to_blocks(np.stack(carriages + dampers + stiffness + pushes)),
         pulse=to_blocks(_pulses(model, values)),
         phase=_phases(model, values),
-        of_carriages=to_blocks(heavy),
+        of_carriages=to_blocks(loads_of(model, values, heavy)),
         time_scale=to_blocks(values.scene_time_scale),
         gravity=to_blocks(values.gravity),
     )

@@ -130,6 +130,11 @@ class SceneModel:
         return tuple(spring for spring in self.springs if spring.mode is not None)
 
     @property
+    def varying(self) -> list[int]:
+        """Numbers, among the springs, of contacts whose stiffness is a lane's own."""
+        return [number for number, spring in enumerate(self.springs) if spring.varies]
+
+    @property
     def scheme(self) -> Scheme:
         """The time integration scheme."""
         return self.numerics.scheme

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from engine.model.ties import Attachment, Load, SpringTie
-from engine.scene.variants import SpringKeys
+from engine.scene.variants import SpringKeys, contact_stiffness_keys
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
 
@@ -67,12 +67,14 @@ def stand(study: Study, numerics: Numerics, place: Place, swept: Collection[str]
     _check_joints(study, name, _joints(carriage, riders, place))
     shares = _shares(study, numerics, name, modal)
     loads = tuple(Load(*load) for load in zip(itertools.count(place.first), shares, place.below))
-    springs = []
+    springs, varying = [], set(contact_stiffness_keys(study)) & set(swept)
     for load, (word, contact) in zip(loads, carriage.riding_contacts.items(), strict=True):
         keys = SpringKeys.of_contact(name, word)
         held = Attachment(-1.0, place.rides, None, contact.place)
         damped = contact.damping > 0.0 or keys.damping in swept
-        springs.append(SpringTie(place.number, load.rider, load.body, keys, held, None, damped, contact.is_rigid))
+        kind = damped, contact.is_rigid, keys.stiffness in varying
+        springs.append(SpringTie(place.number, load.rider, load.body, keys, held, None, *kind))
+    _check_determinate(study, name, modal, springs)
     acting = tuple(springs) if numerics.knows_springs else ()
     reference = carriage.reference_on(modal.length)
     carried = replace(place.tie, loads=loads, rides=place.rides, reference=reference)
@@ -145,6 +147,19 @@ def _places_in_words(study: Study, name: str) -> str:
     return ", ".join(
         f"{word} at {c.at:g} m" if c.at is not None else f"{word} at {c.point}" for word, c in contacts.items()
     )
+
+
+def _check_determinate(study: Study, name: str, modal: ModalBody, springs: Sequence[SpringTie]) -> None:
+    """Refuse contacts that share the weight by stiffnesses which are the variants' own."""
+    held = np.stack([spring.held.fixed_row(modal)[modal.omega == 0.0] for spring in springs if spring.held])
+    if any(spring.varies for spring in springs) and np.linalg.matrix_rank(held) < len(held):
+        raise study.source.fault(
+            f"carriage.{name}.contacts",
+            "these contacts share what they carry by their stiffnesses, which the sweep varies",
+            expected="contacts at different places of a body that is free to heave and to pitch",
+            received=_places_in_words(study, name),
+            remedy=f"body.{study.carriage[name].riding_body}.modes = 2 or more, or one stiffness for all variants",
+        )
 
 
 def _check_fidelity(study: Study, name: str) -> None:

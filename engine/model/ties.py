@@ -89,7 +89,7 @@ class SpringTie:
 
     carriage, rider: numbers. body: that of the body which it stands on. keys: of its numbers in the study.
     held: where it holds the body that rides; None for a sprung mass, whose mode is ``mode``. damped: whether there is a
-    damper. rigid: whether it is a rigid joint instead.
+    damper. rigid: whether it is a rigid joint instead. varies: whether lanes have stiffnesses of their own.
     """
 
     carriage: int
@@ -100,6 +100,7 @@ class SpringTie:
     mode: int | None
     damped: bool
     rigid: bool = False
+    varies: bool = False
 
     @property
     def attachments(self) -> tuple[Attachment, ...]:

@@ -17,17 +17,17 @@ def value_in(scene: Spec, path: str) -> Any:
     """The value at a dotted key of a scene. KeyError, which names the keys there are, where there is none."""
     found: Any = scene
     for key in path.split("."):
-        inside = _inside(found)
+        inside = _keys_inside(found)
         if key not in inside:
             raise KeyError(f"{path}: no {key} there, but {', '.join(inside) or 'a number, word or nothing'}")
-        found = inside[key]
+        found = getattr(found, key) if isinstance(found, Spec) else inside[key]
     return found
 
 
-def _inside(value: Any) -> dict[str, Any]:
-    """What stands below a value, by key; nothing below numbers and words."""
+def _keys_inside(value: Any) -> Mapping[str, Any]:
+    """By key what stands below a value, or what says how to get it; nothing below numbers and words."""
     if isinstance(value, Spec):
-        return {name: getattr(value, name) for name in (*type(value).model_fields, *type(value).derived)}
+        return type(value).model_fields | dict.fromkeys(type(value).derived)
     if isinstance(value, tuple):
         return {str(index): item for index, item in enumerate(value)}
     return value if isinstance(value, dict) else {}

@@ -100,11 +100,29 @@ def modal_mass_keys(study: Study) -> dict[str, tuple[str, ...]]:
     return found
 
 
+#: Contacts on which a body that nothing else holds stands so that their forces at rest follow from weights alone.
+DETERMINATE = 2
+
+
+def contact_stiffness_keys(study: Study) -> tuple[str, ...]:
+    """The keys of the stiffnesses of contacts, where every body that rides is statically determinate: a lane may have
+    them to itself, as no force at rest depends on them. Of a rigid contact there is none."""
+    found = list[str]()
+    for name, carriage in study.carriage.items():
+        contacts = carriage.riding_contacts
+        apart = len({contact.place for contact in contacts.values()}) == len(contacts) <= DETERMINATE
+        if carriage.riding_body is not None and not (apart and study.body[carriage.riding_body].is_free):
+            return ()
+        found += (SpringKeys.of_contact(name, word).stiffness for word, own in contacts.items() if not own.is_rigid)
+    return tuple(found)
+
+
 def structural(study: Study, cases: Cases) -> list[str]:
     """Swept keys that change the scene itself."""
     motions = {f"carriage.{name}.motion.": carriage.motion for name, carriage in study.carriage.items()}
     fixed = {f"{here}{key}" for here, motion in motions.items() for key in ("speed", "frequency") if key != motion.pace}
-    own = UnitKeys.of(study).set_by(axis.paths for axis in cases.axes).union(*modal_mass_keys(study).values())
+    own = UnitKeys.of(study).set_by(axis.paths for axis in cases.axes)
+    own = own.union(contact_stiffness_keys(study), *modal_mass_keys(study).values())
     return [path for path in cases.paths if path in fixed or not (LANE_KEYS.fullmatch(path) or path in own)]
 
 
@@ -223,7 +241,7 @@ class VariantValues:
         key = f"carriage.{carriage}.motion.{motion.pace}"
         return float(motion.time_scale * self.study.value(key)) / self.column(key)
 
-    @property
+    @cached_property
     def scene_time_scale(self) -> Array:
         """(V,) seconds per unit of scene time."""
         return self.time_scale(self.study.clock) if self.study.carriage else np.ones(self.size)

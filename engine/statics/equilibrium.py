@@ -6,11 +6,13 @@ Springs F and coordinates z that nothing but springs hold (sprung masses, rigid 
 
 with C the elastic flexibility between ties (kept modes, and what they miss), P the ties' rows of z, and W the weights
 of the carriages on the ties d. A body without supports that is ridden is balanced by its inertia, as in its influence
-lines.
+lines. Where contacts have lanes' own stiffnesses, F follows from W alone, and z grows by -P^+ F for each unit by which
+1/k is larger than the model's.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -28,8 +30,8 @@ UNFELT = 1e-9  # of the largest row of a loose coordinate: what springs feel of 
 
 @dataclass(frozen=True, eq=False)
 class StaticState:
-    """Per unit weight of each carriage, and last per unit gravity: forces of all ties (S or 1, ties, L), and the loose
-    coordinates (S or 1, m, L), whose numbers among all modes are ``loose``."""
+    """Per unit of each of `lane_table.static_loads`: forces of all ties (S or 1, ties, L), and the loose coordinates
+    (S or 1, m, L), whose numbers among all modes are ``loose``."""
 
     force: Array
     loose: Counts
@@ -62,9 +64,9 @@ def static_state(model: SceneModel, along: Along) -> StaticState:
     gap[:, :, :count] = soft[:, springs, :count]
     gap[:, :, count] = _level(model, along)
     own = np.array([0.0 if s.rigid else 1.0 / model.study.value(s.keys.stiffness) for s in model.springs])
-    matrix = soft[:, springs, springs] + np.diag(own)
-    force, coordinate = _solved(matrix, held, gap, pushed)
-    whole = np.repeat(weights, stations, axis=0)
+    force, coordinate = _solved(soft[:, springs, springs] + np.diag(own), held, gap, pushed, model.varying)
+    whole = np.zeros((stations, model.ties, force.shape[2]))
+    whole[:, :, :count] = weights[:, :, :count]
     whole[:, springs] = force
     return StaticState(whole, loose, coordinate)
 
@@ -91,8 +93,9 @@ def _level(model: SceneModel, along: Along) -> Array:
     return found
 
 
-def _solved(matrix: Array, held: Array, gap: Array, pushed: Array) -> tuple[Array, Array]:
-    """Forces (S, R, L) and loose coordinates (S, m, L); what no spring feels stays at rest.
+def _solved(matrix: Array, held: Array, gap: Array, pushed: Array, varying: Sequence[int]) -> tuple[Array, Array]:
+    """Forces (S, R, L) and loose coordinates (S, m, L); what no spring feels stays at rest. varying: numbers of the
+    springs that may be softer, of which the columns before the last tell.
 
     Rows and columns are scaled to one size, so that one small number tells what is not held.
     """
@@ -108,5 +111,13 @@ def _solved(matrix: Array, held: Array, gap: Array, pushed: Array) -> tuple[Arra
     right = np.zeros((len(matrix), springs + count, loads))
     right[:, :springs] = -gap / unit
     right[:, springs:, : pushed.shape[1]] = -np.swapaxes(pushed / size, 1, 2)
-    found = np.linalg.pinv(whole, rcond=1e-11) @ right
-    return found[:, :springs], found[:, springs:] * unit / size[:, None]
+    inverse = np.linalg.pinv(whole, rcond=1e-11)
+    found = inverse @ right
+    force, coordinate = found[:, :springs], found[:, springs:] * unit / size[:, None]
+    yielding = -inverse[:, springs:, :springs] / size[:, None]
+    softer = [yielding[:, :, number, None] * force[:, number, None, :-1] for number in varying]
+    unmoved = np.zeros((len(matrix), springs, len(varying) * (loads - 1)))
+    return (
+        np.concatenate([force[:, :, :-1], unmoved, force[:, :, -1:]], axis=2),
+        np.concatenate([coordinate[:, :, :-1], *softer, coordinate[:, :, -1:]], axis=2),
+    )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from engine.model.lane_table import weights
+from engine.model.lane_table import loads_of, static_loads
 from engine.model.station_path import Along, standing
 from engine.observation.contact_forces import contact_forces, contact_row
 from engine.observation.kinks import stops
@@ -24,13 +24,14 @@ if TYPE_CHECKING:
     from engine.scene.variants import VariantValues
 
 
+PROBED = 65  # places along a body at which the largest reading per unit force is looked for: one in a wave of 64 modes
 STATIONS = 1024  # at which the largest static reading of a sensor is looked for
 SLOPE_STEP = 1e-5  # of the body's length, between places of a static derivative
 
 
 class StaticReadings(NamedTuple):
     """sensors (V, S, J) and contact forces (V, S, K) of `signals.contact_forces` under all weights and forces, and
-    sensors per unit weight of the first carriage alone, (S, J)."""
+    sensors per unit weight of the first carriage alone, (V, S, J)."""
 
     sensors: Array
     contacts: Array
@@ -38,9 +39,9 @@ class StaticReadings(NamedTuple):
 
 
 def static_readings(model: SceneModel, sensors: Sequence[Sensor], along: Along) -> Array:
-    """(S, J, C + 1) static readings of sensors per unit weight of each carriage, and last per unit gravity."""
+    """(S, J, L) static readings of sensors per unit of each of `lane_table.static_loads`, last per unit gravity."""
     state = static_state(model, along)
-    found = np.zeros((along[0].s.size, len(sensors), len(model.carriages) + 1))
+    found = np.zeros((along[0].s.size, len(sensors), state.force.shape[2]))
     for j, sensor in enumerate(sensors):
         read = np.einsum("sr,srl->sl", *_together(sensor.unit_static(model, along), state.force))
         if state.loose.size:
@@ -56,31 +57,35 @@ def static_readings(model: SceneModel, sensors: Sequence[Sensor], along: Along) 
 
 
 def left_out(model: SceneModel, signals: Sequence[Signal], along: Along) -> Array | None:
-    """(S, J, C + 1) the static readings that signals leave out of the whole; None where none does."""
+    """(S, J, L) the static readings that signals leave out of the whole; None where none does."""
     readers = [signal.as_sensor(model) for signal in signals]
     parts = [j for j, reader in enumerate(readers) if reader.reads_whole is not reader]
     if not parts:
         return None
-    found = np.zeros((along[0].s.size, len(signals), len(model.carriages) + 1))
-    found[:, parts] = static_readings(model, [readers[j].reads_whole for j in parts], along)
+    own = static_readings(model, [readers[j].reads_whole for j in parts], along)
+    found = np.zeros((len(own), len(signals), own.shape[2]))
+    found[:, parts] = own
     return found
 
 
 def static_values(model: SceneModel, sensors: Sequence[Sensor], values: VariantValues, along: Along) -> StaticReadings:
     """Static readings of sensors and of all contacts, for some variants of a scene."""
-    unit, loads = static_readings(model, sensors, along), _loads(model, values)
+    unit, loads = static_readings(model, sensors, along), static_loads(model, values)
+    alone = loads_of(model, values, np.eye(len(model.carriages), 1) * np.ones(values.size))
     force = static_state(model, along).force
     parts = np.array([contact_row(model, c.carriage, c.contact) for c in contact_forces(model)])
     contacts = np.einsum("kr,srl->skl", parts, np.broadcast_to(force, (along[0].s.size, *force.shape[1:])))
     return StaticReadings(
-        np.einsum("sjl,lv->vsj", unit, loads), np.einsum("skl,lv->vsk", contacts, loads), unit[:, :, 0]
+        np.einsum("sjl,lv->vsj", unit, loads),
+        np.einsum("skl,lv->vsk", contacts, loads),
+        np.einsum("sjl,lv->vsj", unit[:, :, :-1], alone),
     )
 
 
 def static_shapes(model: SceneModel, values: VariantValues, along: Along, body: int, x: Array) -> Array:
     """(V, S, X) deflection of a body at places x (X,) of its track, m, as a sensor there reads it."""
     places = [Sensor("", "displacement", body, float(place), None) for place in x]
-    return np.asarray(np.einsum("sxl,lv->vsx", static_readings(model, places, along), _loads(model, values)))
+    return np.asarray(np.einsum("sxl,lv->vsx", static_readings(model, places, along), static_loads(model, values)))
 
 
 def contact_names(model: SceneModel) -> list[str]:
@@ -92,33 +97,24 @@ def contact_names(model: SceneModel) -> list[str]:
     return found
 
 
-def _loads(model: SceneModel, values: VariantValues) -> Array:
-    """(C + 1, V) weight of every carriage in N, and gravity."""
-    return np.stack([*weights(model, values), values.gravity])
-
-
 def _together(one: Array, other: Array) -> tuple[Array, Array]:
     """Two arrays with as many stations as the one that has more."""
     stations = max(len(one), len(other))
     return np.broadcast_to(one, (stations, *one.shape[1:])), np.broadcast_to(other, (stations, *other.shape[1:]))
 
 
-class StaticUnit(NamedTuple):
-    """Static readings at some stations: per unit force of each carriage (H, J, C), and per unit gravity (H, J)."""
-
-    force: Array
-    gravity: Array
-
-
 @dataclass(eq=False)
 class Statics:
-    """Static readings of sensors by one model along one timeline; what was asked for once is kept, as most marches of
-    a study ask for the same."""
+    """Static readings (H, J, L) of sensors by one model along one timeline, as of `static_readings`; what was asked for
+    once is kept, as most marches of a study ask for the same. coarser: the same along a coarser timeline; by: into how
+    many each of its steps is cut here, and each of its free vibration."""
 
     model: SceneModel
     timeline: Timeline
     sensors: tuple[Sensor, ...]
-    _kept: dict[bytes, StaticUnit] = field(default_factory=dict)
+    coarser: Statics | None = None
+    by: tuple[int, int] = (1, 1)
+    _kept: dict[bytes, Array] = field(default_factory=dict)
     _slopes: dict[bytes, Array] = field(default_factory=dict)
 
     @cached_property
@@ -137,35 +133,53 @@ class Statics:
         return np.unique(np.concatenate([counts, bounds, *passing, met]))
 
     @cached_property
-    def over_window(self) -> StaticUnit:
-        """Readings at `counts`, whole ones of sensors that read a part."""
+    def over_window(self) -> Array:
+        """Readings at `counts`, whole ones of sensors that read a part; of the coarsest timeline."""
+        if self.coarser is not None:
+            return self.coarser.over_window
         return self._at(self.counts, tuple(sensor.reads_whole for sensor in self.sensors))
 
-    def at(self, counts: Array | Counts) -> StaticUnit:
+    @cached_property
+    def largest_influences(self) -> Array:
+        """(J,) the largest static reading per unit force anywhere on a sensor's body; of rates, of displacements."""
+        if self.coarser is not None:
+            return self.coarser.largest_influences
+        lengths = [self.model.bodies[sensor.body].modal.length for sensor in self.sensors]
+        places = [np.linspace(0.0, length, PROBED) for length in lengths]
+        return np.array([s.largest_influence(self.model, x) for s, x in zip(self.sensors, places, strict=True)])
+
+    def at(self, counts: Array | Counts) -> Array:
         """Readings at stations by their count."""
+        if self.coarser is not None and self._on_coarser(counts):
+            return self.coarser.at(counts // self.by[0])
         key = counts.tobytes()
         if key not in self._kept:
             self._kept[key] = self._at(counts, self.sensors)
         return self._kept[key]
 
-    def _at(self, counts: Array | Counts, sensors: tuple[Sensor, ...]) -> StaticUnit:
-        readings = static_readings(self.model, sensors, standing(self.timeline, counts))
-        return StaticUnit(readings[:, :, :-1], readings[:, :, -1])
+    def _on_coarser(self, counts: Array | Counts) -> bool:
+        """Whether all of these are stations of the coarser timeline."""
+        return self.by[0] == self.by[1] and not np.any(counts % self.by[0])
+
+    def _at(self, counts: Array | Counts, sensors: tuple[Sensor, ...]) -> Array:
+        return static_readings(self.model, sensors, standing(self.timeline, counts))
 
     def slope_at(self, counts: Array | Counts) -> Array:
-        """(H, J) derivative of the readings per unit force of the first carriage by its position; 0 where it is not."""
+        """(H, J, L) derivative of the readings by the position of the first carriage; 0 where it is not."""
+        if self.coarser is not None and self._on_coarser(counts):
+            return self.coarser.slope_at(counts // self.by[0])
         key = counts.tobytes()
         if key not in self._slopes:
             along = standing(self.timeline, counts)
             here, active = along[0].here, along[0].active
             assert here is not None
-            none = np.zeros((counts.size, len(self.sensors)))
-            self._slopes[key] = np.where(here[:, None], self._slope(along), 0.0) if active else none
+            slope = self._slope(along) if active else np.zeros_like(self.at(counts))
+            self._slopes[key] = np.where(here[:, None, None], slope, 0.0)
         return self._slopes[key]
 
     def _slope(self, along: Along) -> Array:
-        """(S, J) derivative of the readings per unit weight of the first carriage by its position, from places a little
-        apart, which it reaches with all its contacts."""
+        """(S, J, L) derivative of the readings by the position of the first carriage, from places a little apart, which
+        it reaches with all its contacts."""
         riders, apart = self.model.riders, SLOPE_STEP * self.model.carriages[0].rider.length
         own = {0, *(load.rider for load in self.model.carriages[0].loads)}
         lowest = np.minimum.reduce([along[r].s for r in own])
@@ -175,8 +189,8 @@ class Statics:
             tuple(replace(way, _shapes={}, s=way.s + shift) if r in own else way for r, way in enumerate(along))
             for shift in (before, after)
         ]
-        left, right = (static_readings(self.model, self.sensors, ways)[:, :, 0] for ways in moved)
-        return np.asarray((right - left) / (after - before)[:, None])
+        left, right = (static_readings(self.model, self.sensors, ways) for ways in moved)
+        return np.asarray((right - left) / (after - before)[:, None, None])
 
 
 def _crossings(counts: Array, places: Array, at: float) -> Array:

@@ -17,7 +17,7 @@ from engine.batch.plan import Plan
 from engine.kernels.layout import LANES
 from engine.march.outcome import Flat
 from engine.march.tables import SceneTables
-from engine.model.lane_table import weights
+from engine.model.lane_table import static_loads
 from engine.model.scene_model import build_model
 from engine.model.timeline import refined
 from engine.observation.histories import counts_shown
@@ -126,6 +126,4 @@ def _tables(own: SceneTables, study: Study) -> SceneTables:
 
 def _static(tables: SceneTables, values: VariantValues, counts: Counts) -> Array:
     """(H, J) static readings of the march's own model."""
-    unit = tables.statics.at(counts)
-    loads = weights(tables.model, values)[:, 0]
-    return np.asarray(unit.gravity * values.gravity[0] + unit.force @ loads)
+    return np.asarray(tables.statics.at(counts) @ static_loads(tables.model, values)[:, 0])

@@ -89,8 +89,7 @@ class Influence(AtRestKind):
         found, first = static_values(model, sensors, values, along), _on_bodies(along, [0])[:, 0]
         for j, sensor in enumerate(model.study.sensor):
             named[sensor] = np.where(_read(along, sensors[j], model), found.sensors[:, :, j], np.nan)
-            line = np.where(first, found.influence[:, j], np.nan)
-            named[f"{sensor}_influence"] = np.broadcast_to(line, found.sensors.shape[:2]).copy()
+            named[f"{sensor}_influence"] = np.where(first, found.influence[:, :, j], np.nan)
         touching = contact_forces(model)
         may_lift = np.array([model.may_lift(contact.carriage) for contact in touching])
         contacts = np.where(_on_bodies(along, [contact.rides(model) for contact in touching]), found.contacts, np.nan)

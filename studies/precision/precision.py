@@ -156,7 +156,7 @@ def static_scale(model: SceneModel) -> tuple[Array, float]:
     """Largest static value (J,) of every sensor under the weight, with the static correction; and the weight."""
     tables = SceneTables(with_correction(model, True), 400, "whole")
     weight = ModalEquations(model).weight
-    return np.abs(tables.statics.over_window.force[:, :, 0]).max(axis=0) * weight, weight
+    return np.abs(tables.statics.over_window[:, :, 0]).max(axis=0) * weight, weight
 
 
 def modal_reference(model: SceneModel, states: Solution) -> Reference:

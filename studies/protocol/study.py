@@ -7,7 +7,7 @@ import time
 import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import cached_property
+from functools import cache, cached_property
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -198,17 +198,25 @@ def question_of(study: Study, settings: type[AnySpec]) -> AnySpec:
     >>> question_of(engine.Study(kind="passage", question={"modes": 5}), Counts).modes
     5
     """
-    from pydantic import ValidationError, create_model
+    from pydantic import ValidationError
 
     from engine.study_file.refusals import refuse
-    from engine.study_file.spec import Spec
 
-    data = {"question": study.question}
-    whole = create_model("Whole", __base__=Spec, question=(settings, ...))
+    data, whole = {"question": study.question}, _with_question(settings)
     try:
         return whole.model_validate(data).question  # type: ignore[attr-defined, no-any-return]
     except ValidationError as error:
         refuse(error, whole, data, study.source)
+
+
+@cache
+def _with_question(settings: type[Spec]) -> type[Spec]:
+    """What has a table [question] of such settings alone, as its faults are told with their dotted keys."""
+    from pydantic import create_model
+
+    from engine.study_file.spec import Spec
+
+    return create_model("Whole", __base__=Spec, question=(settings, ...))
 
 
 KIND_HAS = ("name", "summary", "question", "start")  # those of another package

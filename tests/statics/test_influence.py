@@ -51,7 +51,7 @@ def test_readings_are_influence_lines() -> None:
     found = readings(study(beam(modes=3), mass(0.5, WAY), sensor=SENSORS))
     weight = 0.5 * G
     expected = np.stack([line(0.3, PLACES), np.minimum(0.3 * (1 - PLACES), PLACES * 0.7), line_at_itself()], axis=1)
-    assert found.influence == pytest.approx(expected, rel=1e-9, abs=1e-15)
+    assert found.influence[0] == pytest.approx(expected, rel=1e-9, abs=1e-15)
     assert found.sensors[0] == pytest.approx(weight * expected, rel=1e-9, abs=1e-15)
     assert found.contacts[0] == pytest.approx(np.full((9, 1), weight))
 
@@ -70,7 +70,7 @@ def test_own_weight_and_other_carriages_are_added() -> None:
     own = 5.0 * G / 384.0, G / 8.0
     other = 2.0 * float(line(0.5, np.array([0.7]))[0]), 2.0 * 0.5 * 0.3
     for j, unit in enumerate((line(0.5, PLACES), 0.5 * np.minimum(PLACES, 1.0 - PLACES))):
-        assert found.influence[:, j] == pytest.approx(unit, rel=1e-9, abs=1e-15)
+        assert found.influence[0, :, j] == pytest.approx(unit, rel=1e-9, abs=1e-15)
         assert found.sensors[0, :, j] == pytest.approx(0.5 * G * unit + own[j] + other[j], rel=1e-9)
 
 
@@ -106,7 +106,7 @@ def test_statics_are_what_a_slow_march_tends_to(name: str) -> None:
     counts = np.arange(0, 201, 20)
     found = march(tables, values, counts, 1).history[:, :, 0]
     unit, twin = tables.statics.at(counts), Twin(case)
-    static = unit.force[:, :, 0] * twin.dead.sum() + unit.gravity * case.gravity
+    static = unit[:, :, 0] * twin.dead.sum() + unit[:, :, -1] * case.gravity
     for j, sensor in enumerate(tables.sensors):
         if sensor.quantity not in ("velocity", "acceleration"):
             assert np.abs(static[:, j] - found[:, j]).max() <= 2e-6 * np.abs(found[:, j]).max(), sensor.name
@@ -124,7 +124,7 @@ def test_static_correction_is_felt_in_the_contacts() -> None:
         bed, solver = beam(modes=modes), {"steps": 400, "static_correction": correction}
         (group,) = make_plan(quiet(bed=bed, solver=solver), check_steps=allow_any_steps).groups
         names = [sensor.name for sensor in group.tables.sensors]
-        return float(group.tables.statics.at(np.array([0, 77])).force[1, names.index("b"), 0])
+        return float(group.tables.statics.at(np.array([0, 77]))[1, names.index("b"), 0])
 
     whole = middle(20, True)
     assert abs(middle(2, True) / whole - 1.0) < 1e-9 < 1e-3 < abs(middle(2, False) / whole - 1.0)
@@ -158,9 +158,9 @@ def test_static_slopes_move_all_contacts() -> None:
         apart = frozen(group.scene, place + np.array([-1e-4, 1e-4]))
         left, right = static_values(
             group.scene, build_sensors(group.scene), VariantValues(case, {}, 1), apart
-        ).influence[:, 0]
+        ).influence[0, :, 0]
         assert abs(right - left) > 1e-7
-        assert float(tables.statics.slope_at(counts)[0, 0]) == pytest.approx((right - left) / 2e-4, rel=1e-4)
+        assert float(tables.statics.slope_at(counts)[0, 0, 0]) == pytest.approx((right - left) / 2e-4, rel=1e-4)
 
 
 TRAIN = {"on": "bed", "kind": "force", "force": [3.0, 5.0], "spacing": [0.4]}

@@ -143,6 +143,10 @@ class Beam(Body):
         return () if isinstance(self.supports, str) else self.supports
 
     @property
+    def is_free(self) -> bool:
+        return self.ends == ("free", "free") and not self.springs
+
+    @property
     def grows_with(self) -> Growing:
         if self.springs:  # whose stiffness stays
             return Growing()

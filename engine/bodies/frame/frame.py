@@ -211,6 +211,10 @@ class Frame(Body):
         return self.line.length
 
     @property
+    def is_free(self) -> bool:
+        return not (self.supports or self.spring)
+
+    @property
     def grows_with(self) -> Growing:
         if self.spring or any(one.shear_modulus is not None for one in self.section.values()):
             return Growing()  # whose stiffness stays

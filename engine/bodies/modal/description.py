@@ -128,6 +128,11 @@ class Body(SpecOfKind):
         return ()
 
     @property
+    def is_free(self) -> bool:
+        """Whether it is known that nothing holds it."""
+        return False
+
+    @property
     def recorded(self) -> Recorded | None:
         """What an archive tells of it, where it comes from one: then there are no files to read."""
         return self._recorded

@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 
 # an end whose modes all move by less than this part of the largest at some places along the track does not move
 HELD, PROBED = 1e-9, 9
+TRACK_PLACES = 257  # along the track, at which the mobility is looked for: four in a wave of 64 modes
 # of the length, within which supports are one: a lever this short resists no rotation that a beam could feel
 SAME_PLACE = 1e-9
 
@@ -278,6 +279,12 @@ class ModalBody:
         if found is None:
             found = self._fixed[place, derivative] = self.shape([place], derivative)
         return found
+
+    @cached_property
+    def mobility(self) -> float:
+        """The largest sum of squared mode shapes anywhere along the track, 1/kg."""
+        places = np.linspace(0.0, self.length, TRACK_PLACES)
+        return float(np.max(np.sum(self.shape(places) ** 2, axis=1)))
 
     @cached_property
     def held_ends(self) -> tuple[bool, bool]:

@@ -57,6 +57,10 @@ class Rigid(Body):
         return ("mass", "inertia")
 
     @property
+    def is_free(self) -> bool:
+        return True
+
+    @property
     def centre_of_mass(self) -> float:
         """m along its track."""
         return 0.5 * self.length if self.centre is None else self.centre
