@@ -85,8 +85,9 @@ def test_studies_that_read_statics_know_it(kind: str) -> None:
     told = [name for name in alone.data_vars if str(name).startswith(("tip", "lag", "odd", "loop"))]
     assert len(told) > (kind == "trajectory")
     for name in told:
-        one, other = np.asarray(found[name], dtype=float), np.asarray(alone[name], dtype=float)
-        assert one == pytest.approx(other, rel=1e-7, abs=1e-12 * np.max(np.abs(np.nan_to_num(other))), nan_ok=True), (
+        one, other = (np.asarray(of[name], dtype=float) for of in (found, alone))
+        size = np.max(np.abs(np.nan_to_num(other)))
+        assert one == pytest.approx(other, rel=1e-7, abs=1e-12 * size, nan_ok=True), (
             name
         )
 
