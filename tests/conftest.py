@@ -4,6 +4,7 @@ that is kept, without which every command that a test starts compiles some 200 f
 And with NO_SKIPS set in the environment a skipped test fails.
 """
 
+import gc
 import os
 from collections.abc import Generator
 from pathlib import Path
@@ -16,6 +17,14 @@ collect_seldom()
 for _library in ("OPENBLAS", "OMP", "MKL"):  # before numpy is imported, and for processes that tests start
     os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # as images of containers often set it
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish() -> None:
+    """pytest looks at all objects there are ten times after its last test, for what failed while it was deleted: once
+    tells that."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture
