@@ -6,7 +6,7 @@ from typing import Annotated
 
 from engine.bodies.beam.beam import Beam
 from engine.bodies.frame.frame import Frame
-from engine.bodies.imported.imported import Ansys, Matrices, Nastran
+from engine.bodies.imported.kinds import Ansys, Matrices, Nastran
 from engine.bodies.modal.description import Body
 from engine.bodies.reduced.reduced import Reduced
 from engine.bodies.rigid.rigid import Rigid

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from engine.bodies.frame.frame import Vector
+from engine.bodies.modal.places import Vector
 from engine.scene.motions.of_joints import AnySliding, AnyTurning, TimeMotion
 from engine.study_file.checks import Check, on_body
 from engine.study_file.spec import KindOf, Noun, Several, Spec, SpecOfKind, Three, kinds

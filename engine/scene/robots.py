@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, Strict, model_validator
 
-from engine.bodies.frame.frame import Vector
+from engine.bodies.modal.places import Vector
 from engine.study_file.checks import Check
 from engine.study_file.spec import KindOf, Noun, Several, Spec, Three
 from engine.study_file.units import (

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
-from engine.bodies.frame.frame import Vector
 from engine.bodies.modal.description import Spot
 from engine.bodies.modal.modal_body import Side
+from engine.bodies.modal.places import Vector
 from engine.study_file.spec import LIST, NUMBER, WORD, Spec, by_form, form_of_amount, one_of
 from engine.study_file.units import Dimensionless, Frequency, Length, fault
 from results_schema.quantities import MEANT, QUANTITIES, Quantity

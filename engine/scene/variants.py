@@ -28,7 +28,7 @@ STEPS, TOLERANCE = "solver.steps", "solver.tolerance"
 #: Keys of numbers that a lane may have to itself; of a motion's that one alone with which all its speeds grow.
 LANE_KEYS = re.compile(
     r"gravity|solver\.(steps|tolerance)"
-    r"|body\.\w+\.(damping_ratio(\..+)?|supports\.\d+\.damping|spring\.\w+\.(rotational_)?damping\.\d)"
+    r"|body\.\w+\.(damping_ratio(\..+)?|supports\.\d+\.damping|spring\.\w+\.(rotational_)?damping\.\d|point\.\w+\.damping)"
     r"|carriage\.\w+\.(mass|wheel_mass|stiffness|damping|force|delay|headway)"
     r"|carriage\.\w+\.contacts\.\w+\.damping"
     r"|carriage\.\w+\.pulsation\.(amplitude|frequency|phase)"

@@ -9,18 +9,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Field, Strict, Tag, model_validator
+from pydantic import AfterValidator, Field, Strict, model_validator
 
 from engine.bodies.frame.geometry import DIRECTIONS, SAME_PLACE, TrackLine, member_ends, unit
 from engine.bodies.frame.refusals import check_frame, check_spot, track_line
 from engine.bodies.modal.description import MAX_MODES, Body, Growing, Spot, Spots, check_square
 from engine.bodies.modal.modal_body import Array, Direction, ModalBody
 from engine.bodies.modal.outline import HELD_AT, Outline
+from engine.bodies.modal.places import Coordinate, Place, Support, Vector, Way
 from engine.bodies.modal.section_doubts import Doubt, section_doubts
-from engine.study_file.spec import LIST, WORD, Several, Spec, Three, by_form, distinct, one_of
+from engine.study_file.spec import Several, Spec, Three, distinct, one_of
 from engine.study_file.units import (
     Area,
     Damping,
@@ -36,10 +37,8 @@ from engine.study_file.units import (
     Stiffness,
     fault,
 )
-from results_schema.errors import shortened
 
 MAX_ELEMENTS = 1000
-MAX_COORDINATE = 1e9
 MAX_POINTS = 50
 MAX_FIXED_INTERFACE_MODES = 64
 MATERIAL = "youngs_modulus", "density"
@@ -51,34 +50,11 @@ MassWord = Annotated[str, AfterValidator(one_of("consistent", "lumped"))]
 PlaneWord = Annotated[str, AfterValidator(one_of(*PLANES))]
 
 
-def _of_word(value: Any) -> Any:
-    """The vector along an axis that is named, as sensors name theirs."""
-    return [float(axis == value) for axis in "xyz"] if isinstance(value, str) and value in tuple("xyz") else value
-
-
-def _not_zero(vector: tuple[float, float, float]) -> tuple[float, float, float]:
-    if not any(vector):
-        raise fault("this direction has no length", expected="three numbers, not all zero", received=shortened(vector))
-    return vector
-
-
-Vector = Annotated[Three[Dimensionless], AfterValidator(_not_zero)]
-#: The same, or an axis by its name.
-Way = Annotated[Vector, BeforeValidator(_of_word, json_schema_input_type=Vector | Literal["x", "y", "z"])]
-Coordinate = Annotated[Length, Field(ge=-MAX_COORDINATE, le=MAX_COORDINATE)]
-Place = Three[Coordinate]
 Node = Annotated[Several[Coordinate], Field(min_length=2, max_length=3)]
 Two = Annotated[tuple[str, str], Strict(False)]
 Names = Annotated[Several[str], AfterValidator(distinct)]
 Triple = tuple[float, float, float]
 _ZERO = (0.0, 0.0, 0.0)
-
-_DirectionWord = Annotated[str, AfterValidator(one_of(*DIRECTIONS))]
-_Directions = Annotated[Several[_DirectionWord], Field(min_length=1, max_length=6), AfterValidator(distinct)]
-_MEANT = {"fixed": "clamped", "hinged": "pinned"}
-_MEANT |= dict.fromkeys(("roller", "rolled", "rolling", "sliding", "guided"), '["z"]')
-_HoldWord = Annotated[str, AfterValidator(one_of(*HELD_AT, meant=_MEANT))]
-Support = Annotated[Annotated[_HoldWord, Tag(WORD)] | Annotated[_Directions, Tag(LIST)], by_form]
 
 
 class Section(Spec):

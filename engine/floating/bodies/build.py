@@ -11,7 +11,7 @@ import numpy as np
 
 from engine.bodies.beam.beam import Beam
 from engine.bodies.frame.frame import Frame as FrameBody
-from engine.bodies.imported.imported import Ansys, Matrices, Nastran
+from engine.bodies.imported.kinds import Ansys, Matrices, Nastran
 from engine.bodies.modal.description import MAX_MODES
 from engine.bodies.rigid.rigid import Rigid
 from engine.floating.bodies.beam import elastic_beam, rigid_body
@@ -50,6 +50,14 @@ def elastic_body(body: Body, frame: Frame, modes: int | None, where: str, hung: 
             expected="beam, frame, rigid, matrices, ansys or nastran",
             received=body.kind,
         )
+    for key, _, coefficient in body.dampers():
+        if coefficient > 0.0:
+            raise BadInput(
+                "dampers of a body in a frame that moves are not built yet",
+                where=f"{where}.{key}",
+                expected="0, and a damping_ratio of the body, or a table [spring] with damping",
+                received=f"{coefficient:g}",
+            )
     if modes is not None and body.modes == "auto" and type(body) in COUNTED:
         modes = enough_modes(_whole(_Content(body.model_dump_json() + body.content, body, frame, where)), modes)
     return build(body, frame, modes, where, hung)

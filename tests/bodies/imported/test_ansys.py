@@ -16,7 +16,7 @@ from engine.bodies.build import build_body
 from engine.bodies.files.ansys_results import recovery_along
 from engine.bodies.files.model import FileModel
 from engine.bodies.files.track import line_between
-from engine.bodies.imported.imported import Ansys
+from engine.bodies.imported.kinds import Ansys
 from engine.bodies.modal.modal_body import ModalBody
 from results_schema.errors import BadInput
 from tests.bodies.models import optional

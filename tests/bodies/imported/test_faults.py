@@ -11,7 +11,7 @@ from scipy.io import mmwrite
 from scipy.sparse import csc_matrix, dia_array, save_npz, tril
 
 from engine.batch.plan import make_plan
-from engine.bodies.imported.imported import Matrices
+from engine.bodies.imported.kinds import Matrices
 from engine.scene.study import load
 from engine.study_file.document import write_document
 from results_schema.errors import BadInput

@@ -14,7 +14,7 @@ from engine.bodies.files.cards import cards_of, check_matrices, check_nodes, row
 from engine.bodies.files.reader import Request, read_files
 from engine.bodies.files.text import lines_of
 from engine.bodies.imported.body import imported_body
-from engine.bodies.imported.imported import Matrices
+from engine.bodies.imported.kinds import Matrices
 from results_schema.errors import BadInput
 from tests.bodies.frames import PINNED, straight
 from tests.bodies.models import BULK, CDB, Files, damaged

@@ -11,7 +11,7 @@ from scipy.sparse import csc_matrix, load_npz, save_npz
 from engine.batch.plan import make_plan
 from engine.batch.plausibility import remarks
 from engine.bodies.build import build_body
-from engine.bodies.imported.imported import Matrices
+from engine.bodies.imported.kinds import Matrices
 from results_schema.errors import BadInput
 from tests.bodies.frames import straight
 from tests.bodies.models import Files, study

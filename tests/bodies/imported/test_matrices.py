@@ -14,7 +14,7 @@ import engine
 from engine.batch.plan import make_plan
 from engine.batch.plausibility import remarks
 from engine.bodies.build import build_body
-from engine.bodies.imported.imported import Matrices
+from engine.bodies.imported.kinds import Matrices
 from engine.bodies.modal.modal_body import ModalBody, gauge_at
 from engine.scene.study import Study, load
 from engine.study_file.document import write_document

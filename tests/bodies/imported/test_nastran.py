@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from scipy.linalg import eigh
 
 from engine.bodies.build import build_body
-from engine.bodies.imported.imported import Nastran
+from engine.bodies.imported.kinds import Nastran
 from engine.bodies.modal.modal_body import ModalBody
 from tests.bodies.frames import CLAMPED_FREE, body, straight
 from tests.bodies.models import Files, optional, write_cards

@@ -9,7 +9,7 @@ from scipy.linalg import eigh
 from scipy.sparse import csc_matrix, save_npz
 
 from engine.bodies.build import build_body
-from engine.bodies.imported.imported import Matrices, Nastran
+from engine.bodies.imported.kinds import Matrices, Nastran
 from engine.bodies.modal.modal_body import ModalBody
 from results_schema.errors import BadInput
 from tests.bodies.frames import LENGTH, MODULUS, PINNED, RAIL, body, straight

@@ -12,7 +12,7 @@ from scipy.sparse import eye as unity
 from scipy.sparse.linalg import spsolve
 
 from engine.bodies.imported.body import motion_of_nodes
-from engine.bodies.imported.imported import Matrices
+from engine.bodies.imported.kinds import Matrices
 from engine.floating.model import build
 from engine.scene.study import Study
 from results_schema.errors import BadInput

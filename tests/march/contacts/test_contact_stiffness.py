@@ -87,9 +87,7 @@ def test_studies_that_read_statics_know_it(kind: str) -> None:
     for name in told:
         one, other = (np.asarray(of[name], dtype=float) for of in (found, alone))
         size = np.max(np.abs(np.nan_to_num(other)))
-        assert one == pytest.approx(other, rel=1e-7, abs=1e-12 * size, nan_ok=True), (
-            name
-        )
+        assert one == pytest.approx(other, rel=1e-7, abs=1e-12 * size, nan_ok=True), name
 
 
 HELD: Table = FRAME | {"supports": {"rear": ["x"]}}
