@@ -12,7 +12,9 @@ from results_schema.lazy_imports import xr
 from results_schema.quantities import AFTER_STOP
 from studies.findings.theory import body_mass
 from studies.protocol.study import kind_named
-from studies.results.formatting import quantity
+from studies.results.findings_common import LOOSE
+from studies.results.formatting import percent, quantity
+from studies.results.places import Index
 from studies.results.results import Results
 
 LOOSE_PART = 0.1  # of a value: an estimated error above stands beside it
@@ -59,6 +61,35 @@ def errors_of_size(results: Results, sensor: str) -> Array:
 def told_error(error: float, value: float, units: str) -> str:
     """What a value may be off, to stand behind it: "" where that is little of it, or not known."""
     return f" ± {quantity(error, units, 2)}" if error > LOOSE_PART * abs(value) else ""
+
+
+def uncertainty(results: Results, result: str, place: Index, beside: float = 0.0) -> str:
+    """How loosely a named value is known, for the sentence that names it; "" where its estimated error is a small part
+    of it, or of a larger value ``beside`` it.
+
+    result: as in the archive's `result`. What is held to no tolerance, though a sensor's could hold it, is told so.
+    """
+    part = _part_of_itself(results, result, place, beside)
+    if not part > LOOSE:
+        return ""
+    ends = ("max", "min")
+    sensor = next((name for name in results.sensors if result in [f"{name}_{end}" for end in ends]), "")
+    free = sensor and np.isnan(float(results.dataset["tolerance"].sel(result=result)))
+    asks = "a tolerance of its own"
+    if free and results.study.sensor[sensor].takes_limit and not results.study.sensor[sensor].frequency_limit:
+        asks = f"a frequency_limit or {asks}"
+    remedy = f"; {asks} on sensor {sensor} asks for more" if free else ""
+    return f" (estimated to within {percent(part)}{remedy})"
+
+
+def _part_of_itself(results: Results, result: str, place: Index, beside: float) -> float:
+    """The estimated error of one variant's result over its own size; of an envelope's largest that is what is told."""
+    error, (name, _, sensor) = results.error_at(result, place), result.partition(" ")
+    told = results.of_sensor(name, sensor) if sensor else results.dataset[name]
+    if not np.isfinite(error) or set(told.dims) - set(results.dims):
+        return error
+    size = max(beside, abs(float(results.everywhere(told)[place])))
+    return float(absolute_errors(results, name, sensor)[place]) / size if size else error
 
 
 def weight(results: Results, carriage: str) -> Any:

@@ -3,8 +3,8 @@
 import numpy as np
 
 from results_schema.arrays import Array
+from studies.findings.absolute_errors import uncertainty
 from studies.findings.beyond import largest_size, limits_of, told_limit
-from studies.results.findings_common import uncertainty
 from studies.results.formatting import quantity
 from studies.results.places import extreme
 from studies.results.results import Results

@@ -15,11 +15,11 @@ from results_schema.status import Fidelity
 from results_schema.variable import outputs
 from results_schema.variables import MARCH, declare
 from studies.findings import indices, theory
-from studies.findings.absolute_errors import absolute_errors, told_error
+from studies.findings.absolute_errors import absolute_errors, told_error, uncertainty
 from studies.findings.settled import Asked, odd_parts, remainder_of_start, shown_sensors, thresholds, where_late
 from studies.protocol.study import Kind
 from studies.results.axes import VARIANT
-from studies.results.findings_common import exceeds, first_carriage, in_words, told_statuses, uncertainty
+from studies.results.findings_common import exceeds, first_carriage, in_words, told_statuses
 from studies.results.formatting import counted, listed, percent, quantity, spanned
 from studies.results.places import Index, extreme
 from studies.results.results import Results

@@ -18,6 +18,7 @@ from results_schema.status import Fidelity
 from results_schema.variable import outputs
 from results_schema.variables import AXES, MARCH, axes, declare
 from studies.findings import indices, theory
+from studies.findings.absolute_errors import uncertainty
 from studies.findings.amplification import DYNAMIC_AMPLIFICATION, with_amplification, with_own_weight
 from studies.findings.effects import hardly_changed
 from studies.findings.peaks import PEAKS, peaks
@@ -25,14 +26,7 @@ from studies.findings.settled import told_unsettled
 from studies.findings.two_peaks import EXPECTED, first_break, pattern, peaks_in_words, slowest
 from studies.protocol.study import Kind
 from studies.results.axes import PACES
-from studies.results.findings_common import (
-    check_sensors,
-    first_carriage,
-    in_words,
-    told_statuses,
-    uncertainty,
-    while_held,
-)
+from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses, while_held
 from studies.results.formatting import MINUS, ROUNDING, counted, listed, number, percent, times
 from studies.results.places import Index, chosen, extreme
 from studies.results.results import Results

@@ -10,7 +10,7 @@ from engine.scene.study import Study
 from results_schema.arrays import Array
 from results_schema.lazy_imports import xr
 from results_schema.variables import MARCH, declare
-from studies.findings.absolute_errors import errors_of_size
+from studies.findings.absolute_errors import errors_of_size, uncertainty
 from studies.findings.amplification import (
     DYNAMIC_AMPLIFICATION,
     beside,
@@ -47,14 +47,7 @@ from studies.findings.in_step import told_between_speeds, told_in_step, told_pul
 from studies.findings.residual import asks_of_rest, check_residual, crosses, most_ringing, residuals
 from studies.protocol.study import Kind, question_of
 from studies.results.axes import PACES, VARIANT
-from studies.results.findings_common import (
-    check_sensors,
-    first_carriage,
-    in_words,
-    told_statuses,
-    uncertainty,
-    while_held,
-)
+from studies.results.findings_common import check_sensors, first_carriage, in_words, told_statuses, while_held
 from studies.results.formatting import listed, number, once, percent, quantity, times
 from studies.results.places import Index
 from studies.results.results import Results

@@ -7,10 +7,11 @@ import numpy as np
 from engine.scene.study import Study
 from results_schema.variable import outputs
 from results_schema.variables import MARCH, declare
+from studies.findings.absolute_errors import uncertainty
 from studies.findings.beyond import AskedOfRest, of_every_quantity
 from studies.findings.residual import check_residual, most_ringing, residuals
 from studies.protocol.study import Kind, question_of
-from studies.results.findings_common import check_sensors, first_carriage, over_all, told_statuses, uncertainty
+from studies.results.findings_common import check_sensors, first_carriage, over_all, told_statuses
 from studies.results.formatting import counted, quantity, spanned
 from studies.results.places import Index
 from studies.results.results import Results
@@ -92,4 +93,5 @@ def _span(results: Results, sensor: str) -> str:
     named = zip((f"{sensor}_min", f"{sensor}_max"), places, strict=True)
     looser = max(named, key=lambda end: np.nan_to_num(results.error_at(*end)))
     what = f"{results.noun(sensor)} {results.place(sensor)}"
-    return f"{sensor}: the {what} goes from {span}{over_all(results)}{uncertainty(results, *looser)}."
+    loosely = uncertainty(results, *looser, max(map(abs, ends)))
+    return f"{sensor}: the {what} goes from {span}{over_all(results)}{loosely}."

@@ -8,14 +8,14 @@ from engine.march.settling import names_of_times
 from engine.scene.frames import GROUND
 from results_schema.arrays import Mask
 from results_schema.quantities import AFTER_STOP
-from studies.findings.absolute_errors import errors_of_size
+from studies.findings.absolute_errors import errors_of_size, uncertainty
 from studies.findings.amplification import sizes
 from studies.findings.beyond import limits_of, ranked, told_limit
 from studies.findings.effects import by_effect, told_effects
 from studies.findings.residual import settling_of, told_settling, until_settled
 from studies.moving.question import Question
 from studies.protocol.study import question_of
-from studies.results.findings_common import in_words, over_all, told_statuses, uncertainty, while_held
+from studies.results.findings_common import in_words, over_all, told_statuses, while_held
 from studies.results.formatting import ROUNDING, counted, quantity
 from studies.results.places import extreme
 from studies.results.results import Results
@@ -175,7 +175,7 @@ def _driven(results: Results) -> Iterator[str]:
         index = extreme(np.maximum(np.abs(low), np.abs(high)))
         if index is not None:
             span = _span(low.values[index], high.values[index], "N")
-            loosely = uncertainty(results, f"{name}_contact_force_max", index)
+            loosely = uncertainty(results, f"{name}_contact_force_max", index, abs(float(low.values[index])))
             yield f"{name}: {while_held(results)}the contact force goes from {span}{loosely}{in_words(results, index)}."
 
 

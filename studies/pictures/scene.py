@@ -284,12 +284,13 @@ def _draw_spring(body: Placed, spring: Elastic, sheet: Sheet) -> None:
     if spring.to is not None:
         sheet.spring(place, body.at(spring.to), damped=spring.damped)
         return
-    for axis, rate in zip(body.turn.T, spring.stiffness, strict=True):
-        if rate > 0.0:
-            outward = -np.sign(axis.sum()) * axis
-            end = place + 2.2 * u * outward
-            sheet.spring(place, end, damped=spring.damped)
-            sheet.ground(end, outward)
+    pulled = [axis for axis, rate in zip(body.turn.T, spring.stiffness, strict=True) if rate > 0.0]
+    alone = spring.damped and not (pulled or any(spring.rotational))  # a damper, whose direction is not known here
+    for axis in [UP] if alone else pulled:
+        outward = -np.sign(axis.sum()) * axis
+        end = place + 2.2 * u * outward
+        sheet.spring(place, end, damped=spring.damped)
+        sheet.ground(end, outward)
     if any(spring.rotational):
         sheet.line(place[None], marker="o", markersize=9.0, markerfacecolor="none", markeredgecolor=INK)
 

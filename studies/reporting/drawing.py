@@ -236,7 +236,7 @@ def _supports(scene: Layout) -> Table:
                     name,
                     spring.name,
                     _place(body.at(spring.place)),
-                    f"spring: {', '.join([*rates, *(['damper'] if spring.damped else [])])}",
+                    "spring: " * bool(rates) + ", ".join([*rates, *["damper"] * spring.damped]),
                 )
             )
         for lump in body.outline.masses:

@@ -94,24 +94,6 @@ def while_held(results: Results) -> str:
     return "while the contact holds, " if results.held.any() else "with a contact that opens in every variant, "
 
 
-def uncertainty(results: Results, result: str, place: Index) -> str:
-    """How loosely a named value is known, for the sentence that names it; "" where its estimated error is small.
-
-    result: as in the archive's `result`. What is held to no tolerance, though a sensor's could hold it, is told so.
-    """
-    error = results.error_at(result, place)
-    if not error > LOOSE:
-        return ""
-    ends = ("max", "min")
-    sensor = next((name for name in results.sensors if result in [f"{name}_{end}" for end in ends]), "")
-    free = sensor and np.isnan(float(results.dataset["tolerance"].sel(result=result)))
-    asks = "a tolerance of its own"
-    if free and results.study.sensor[sensor].takes_limit and not results.study.sensor[sensor].frequency_limit:
-        asks = f"a frequency_limit or {asks}"
-    remedy = f"; {asks} on sensor {sensor} asks for more" if free else ""
-    return f" (estimated to within {percent(error)}{remedy})"
-
-
 def exceeds(results: Results, values: Array, threshold: float) -> str:
     """Where values (in the sweep's shape) first exceed a threshold, along the speed where it is swept."""
     beyond = np.isfinite(values) & (values > threshold)

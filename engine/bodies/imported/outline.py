@@ -11,7 +11,7 @@ from engine.bodies.files.model import FileModel
 from engine.bodies.frame.geometry import unit
 from engine.bodies.imported.body import motion_of_nodes
 from engine.bodies.modal.description import Spot
-from engine.bodies.modal.outline import Held, Line, Outline
+from engine.bodies.modal.outline import Elastic, Held, Line, Outline
 from results_schema.arrays import Array
 
 if TYPE_CHECKING:
@@ -40,6 +40,11 @@ def imported_outline(body: Imported) -> Outline:
         cloud=Line(places[shown], motion[shown]),
         nodes=named,
         held=tuple(_held(body, file, places)),
+        springs=tuple(
+            Elastic(f"point {name}", named[name], (0.0, 0.0, 0.0), damped=True)
+            for name, point in body.point.items()
+            if point.damping > 0.0
+        ),
         counts={
             "nodes": len(places),
             "on the track": len(line.nodes),

@@ -1,5 +1,6 @@
 """Dampers at nodes of bodies out of files: beside those of the frame that the files are of, and what refuses them."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import studies
 from engine.batch.plan import make_plan
 from engine.scene.study import Study
 from results_schema.errors import BadInput
+from studies.reporting.drawing import write_drawing
 from tests.bodies.frames import LENGTH, straight
 from tests.bodies.models import Files, study
 
@@ -65,3 +67,9 @@ def test_frames_that_move_have_no_dampers(files: Files) -> None:
         case = Study(kind="moving-frames", body={"bed": body}, frame=moved, question={"duration": 0.1})
         with pytest.raises(BadInput, match=f"body.bed.{key}: dampers of a body in a frame that moves"):
             studies.run(case)
+
+
+def test_drawings_show_them(files: Files, tmp_path: Path) -> None:
+    assert "<td>damper</td>" not in write_drawing(study(damped(files)), tmp_path / "none").read_text(encoding="utf-8")
+    text = write_drawing(study(damped(files, 1e3)), tmp_path / "one").read_text(encoding="utf-8")
+    assert "point mount" in text and "<td>damper</td>" in text
