@@ -305,8 +305,8 @@ DRAWN: Mapping[str, Drawn] = {
     ),
     "shuttle": Drawn(
         _shuttle_title,
-        "Largest growth per period of a mass that swings over the whole body, s = L/2 + L/2 sin(Ωt), 3 modes. Dark is "
-        "stable.",
+        "Largest growth per period of a mass that swings over the whole body, s = L/2 + L/2 sin(Ωt). Dark is stable. "
+        "Without damping narrow bands are those of the modes that are kept: more modes have others.",
         3.2,
         _shuttle,
     ),

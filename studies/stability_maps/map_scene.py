@@ -60,6 +60,17 @@ class Ground:
         return self._own.leading_body.modal.rigid_modes > 0
 
     @property
+    def modes(self) -> int:
+        """Modes that the study gives the body; 0 where it leaves them open."""
+        modes = self.study.body[self.body].modes
+        return 0 if modes == "auto" else int(modes)
+
+    @property
+    def damping_ratio(self) -> float:
+        """The body's damping ratio."""
+        return float(self.study.value(f"body.{self.body}.damping_ratio"))
+
+    @property
     def mass_ratio(self) -> float:
         """The carriage's mass over the body's."""
         return self._carriage.moving_mass / self._own.leading_body.modal.mass

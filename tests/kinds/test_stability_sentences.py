@@ -68,6 +68,7 @@ def shuttle_said(free: list[float], damped: list[float], low: float) -> str:
     mass, frequency = "shuttle_mass_ratio", "shuttle_frequency_ratio"
     data = {
         "multiplier": (("shuttle_damping_ratio", mass, frequency), [[free], [damped]]),
+        "multiplier_fewer_modes": (("shuttle_damping_ratio", mass, frequency), [[free[1:] + free[:1]], [damped]]),
         "tongue_low": (mass, [low]),
         "tongue_high": (mass, [low + 0.1]),
         "tongue_theory": (mass, [0.8]),
@@ -80,6 +81,7 @@ def test_the_swinging_mass_names_a_main_band_and_the_share_of_the_map() -> None:
     said = shuttle_said([1.0, 2.0, 1.5, 1.0], [1.0, 1.5, 1.0, 1.0], 0.75)
     assert "main band near the formula" in said and "0.75 to 0.85" in said
     assert "50 % is unstable without damping and 25 % with 2 %" in said and "2 times without" in said
+    assert "a third fewer modes 50 % of the map is judged otherwise without damping, 0 % with 2 %." in said
     same = shuttle_said([1.0, 2.0, 1.5, 1.0], [1.0, 1.9, 1.4, 1.0], math.nan)
     assert "near the formula for one mode nothing grows; of the whole map" in same
     assert "50 % is unstable without damping and about as much with 2 %" in same and "shrinks" not in same
