@@ -1,23 +1,28 @@
 """How fast the start dies out of what goes to and fro, which variants have settled by the last cycle, and how far these
 differ forward and backward."""
 
+from functools import lru_cache
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field, Strict
 
+from engine.methods.cycle_growth import GROWS, growth_per_cycle
 from engine.study_file.spec import Spec
 from engine.study_file.units import Dimensionless
 from results_schema.arrays import Array, Mask
 from results_schema.status import Fidelity
 from studies.findings import theory
 from studies.protocol.study import question_of
-from studies.results.formatting import counted, percent
-from studies.results.places import chosen
+from studies.results.findings_common import in_words
+from studies.results.formatting import counted, percent, times
+from studies.results.places import chosen, extreme
 from studies.results.results import Results
 
 BASIS = 12  # modes of the body, of whose vibrations with mass and dampers the slowest decay counts
 SLOW = 6  # eigenvalues of these, the smallest: three vibrations, of which the third swings by a hundredth of the first
+FAR_ABOVE = 2.0  # times the static value: what vibrates so much may grow from cycle to cycle
+MOST_GROWING = 256  # variants of which that is asked, about a tenth of a second
 SHOWN = 3  # sensors, of many, that sentences and figures are about
 MOST = 1000  # different bodies, masses and dampers in a sweep, an eighth of a second; of more no decay is known
 PLACES = 65  # along the way, at the heaviest of which the mass stands: there the vibration dies out the slowest
@@ -53,8 +58,42 @@ def decay_rates(results: Results) -> Array:
 
 def remainder_of_start(results: Results) -> Array:
     """Part of the vibration of the start that is left in the last cycle of a motion to and fro, for every variant; NaN
-    where that is not known."""
+    where that is not known, infinite where it grows from cycle to cycle."""
+    return np.where(growth(results) > GROWS, np.inf, _died_out(results))
+
+
+def _died_out(results: Results) -> Array:
+    """The same as if nothing grew."""
     return np.asarray(np.exp(-decay_rates(results) * theory.cycle_time(results) * (theory.cycles(results) - 1.0)))
+
+
+@lru_cache(maxsize=2)
+def growth(results: Results) -> Array:
+    """By how much the vibration grows from cycle to cycle, in the sweep's shape, of the variants whose start has not
+    died out, or which are far above statics or diverged: of many those furthest above; NaN elsewhere."""
+    above = next(name for name in ("dynamic_amplification", "odd_rms") if name in results.dataset)
+    gains = [results.everywhere(results.of_sensor(above, name)) for name in results.sensors]
+    gain = np.where(results.kept.values, np.max(np.nan_to_num(gains), axis=0), np.inf).ravel()
+    doubted = (gain > FAR_ABOVE) | (_died_out(results).ravel() > results.study.solver.tolerance)
+    furthest = np.argsort(-gain, kind="stable")
+    asked, found = furthest[doubted[furthest]][:MOST_GROWING], np.full(results.size, np.nan)
+    found[asked] = growth_per_cycle(results.study, asked)
+    return found.reshape(results.shape)
+
+
+def told_growing(results: Results) -> list[str]:
+    """In how many variants the vibration grows from cycle to cycle, by how much and where; nothing where in none."""
+    factor = growth(results)
+    grows, place = factor > GROWS, extreme(factor)
+    if place is None or not grows.any():
+        return []
+    most = times(float(factor[place])) if np.isfinite(factor[place]) else "beyond all numbers"
+    return [
+        f"In {int(grows.sum()):,} of {counted(results.size, 'variant')} the vibration grows from cycle to cycle, by up "
+        f"to {most} (the largest Floquet multiplier{in_words(results, place)}): the mass that goes to and fro shakes "
+        "its body. What is said of these depends on how many cycles are marched, and no number of cycles settles them; "
+        "more damping, another mass or another frequency may."
+    ]
 
 
 def _slowest(row: Array, frequencies: Array, heaviest: Array, held: Array) -> float:
@@ -130,7 +169,7 @@ def told_unsettled(results: Results) -> list[str]:
     """How many marched variants still carry more of the vibration of the start in their last cycle than the study's
     tolerance, and with how many cycles they would not; nothing where none is known to."""
     left, held = remainder_of_start(results), results.study.solver.tolerance
-    late = (left > held) & (results.dataset["fidelity_used"].values != int(Fidelity.STATIC))
+    late = (left > held) & np.isfinite(left) & (results.dataset["fidelity_used"].values != int(Fidelity.STATIC))
     if not late.any():
         return []
     most, part, cycles = float(left[late].max()), left[late], theory.cycles(results)[late]

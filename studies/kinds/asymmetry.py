@@ -16,7 +16,15 @@ from results_schema.variable import outputs
 from results_schema.variables import MARCH, declare
 from studies.findings import indices, theory
 from studies.findings.absolute_errors import absolute_errors, told_error, uncertainty
-from studies.findings.settled import Asked, odd_parts, remainder_of_start, shown_sensors, thresholds, where_late
+from studies.findings.settled import (
+    Asked,
+    odd_parts,
+    remainder_of_start,
+    shown_sensors,
+    thresholds,
+    told_growing,
+    where_late,
+)
 from studies.protocol.study import Kind
 from studies.results.axes import VARIANT
 from studies.results.findings_common import exceeds, first_carriage, in_words, told_statuses
@@ -112,8 +120,9 @@ class Asymmetry(Kind):
     def findings(self, results: Results) -> list[str]:
         left = remainder_of_start(results)
         settled = ~(left > thresholds(results)[0])
-        answer, start = _answer(results), _start(results, left)
-        said = [answer, start] if settled.any() else [start, answer]
+        answer = _answer(results, settled)
+        start = [*told_growing(results), _start(results, np.where(np.isinf(left), 1.0, left))]
+        said = [answer, *start] if settled.any() else [*start, answer]
         for sensor in shown_sensors(results):
             said += [_lag(results, sensor), _first_beyond(results, sensor, settled)]
         return [*said, *_mass(results), *told_statuses(results)]
@@ -177,7 +186,7 @@ def _start(results: Results, left: Array) -> str:
     return f"{count} {told}: {advice}.{unknown}"
 
 
-def _answer(results: Results) -> str:
+def _answer(results: Results, fine: Mask) -> str:
     """Yes or no, by the largest odd part of all sensors in the variants that have settled, or in all if none has."""
     if extreme(results.dataset["odd_rms"]) is None:
         return "No variant has values, so the question stays open."
@@ -186,11 +195,12 @@ def _answer(results: Results) -> str:
     if place is None:
         return "No variant that has settled has values, so the question stays open."
     largest, sensor = float(odd[place]), list(results.sensors)[place[-1]]
-    at = f"{uncertainty(results, f'odd_rms {sensor}', place[:-1])}{in_words(results, place[:-1])}"
+    who = f", of the {counted(int(fine.sum()), 'variant')} that settled" if fine.any() and not fine.all() else ""
+    at = f"{uncertainty(results, f'odd_rms {sensor}', place[:-1])}{in_words(results, place[:-1])}{who}"
     if largest < NOTICEABLE:
         return (
-            f"Hardly: at {sensor}, where they differ most, forward and backward differ by {percent(largest)} of the "
-            f"static range (rms of the odd part){at}."
+            f"Hardly: at {sensor}, where they differ most, forward and backward differ by {percent(largest)} of "
+            f"the static range (rms of the odd part){at}."
         )
     return (
         f"Yes: at {sensor} forward and backward differ by up to {percent(largest)} of the static range "

@@ -22,7 +22,7 @@ from studies.findings.absolute_errors import uncertainty
 from studies.findings.amplification import DYNAMIC_AMPLIFICATION, with_amplification, with_own_weight
 from studies.findings.effects import hardly_changed
 from studies.findings.peaks import PEAKS, peaks
-from studies.findings.settled import told_unsettled
+from studies.findings.settled import told_growing, told_unsettled
 from studies.findings.two_peaks import EXPECTED, first_break, pattern, peaks_in_words, slowest
 from studies.protocol.study import Kind
 from studies.results.axes import PACES
@@ -146,7 +146,8 @@ class DoublePeak(Kind):
         for sensor in chosen(list(results.sensors), MOST_SENSORS):
             said += [_answer(results, sensor), *_breaks(results, sensor), *_amplified(results, sensor)]
             said += [*_halves(results, sensor), *_end_springs(results, sensor)]
-        return [*said[:1], *told_unsettled(results), *said[1:], *told_statuses(results)]
+        unsettled = [*told_growing(results), *told_unsettled(results)]
+        return [*said[:1], *unsettled, *said[1:], *told_statuses(results)]
 
     def named(self, results: Results) -> list[Index]:
         """For every sensor of the answer the variant where two peaks end and that with the largest amplification."""
