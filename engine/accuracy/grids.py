@@ -52,6 +52,7 @@ CLOSE_STEPS = 20_000
 #: beyond, takes a quarter of the steps by it.
 SLOWLY = 8
 BEGINNING = 1e-9  # of scene time: what a rider is on then it is on at the start
+MOST_FREE = 2048  # the same at most: of a passage at 30 times the critical speed; at 3e4 times it took minutes
 LEAST_FREE = 8  # steps per first period of free vibration: what the coarsest march of such passages had
 
 
@@ -98,7 +99,7 @@ class SceneGrid:
             free, pairs = free_steps(self.scene), self.scene.scheme.stride
             return free if pairs == 1 else max(-(-free // pairs), self.unit)  # whose whole histories come closer
         passage = float(np.exp(np.mean(np.log(scale)))) * self.scene.first_omega / (2.0 * np.pi)
-        return max(LEAST_FREE, int(np.ceil(self.unit / passage)))
+        return min(max(LEAST_FREE, int(np.ceil(self.unit / passage))), MOST_FREE)
 
     @property
     def readings(self) -> Literal["contacts", "accelerations"]:

@@ -114,6 +114,18 @@ def alias_steps(model: SceneModel, time_scale: Array) -> Array:
     return model.scheme.stride * found
 
 
+def pace_of_waves(model: SceneModel, time_scale: Array) -> Array:
+    """(V,) the largest speed of a mass that rides over the phase speed of its body's highest wave that is kept,
+    v k_N/omega_N: of a uniform beam speed over critical speed and number of modes; 0 without any."""
+    found = np.zeros_like(time_scale)
+    for carriage in model.carriages:
+        body = model.bodies[carriage.body].modal
+        if carriage.inertia != "force":
+            wave = float(np.max(body.wave_number)) * carriage.rider.top_speed
+            found = np.maximum(found, wave / (float(body.omega.max()) * time_scale))
+    return found
+
+
 def _alias_root(scheme: Scheme, wave: float, angle: Array) -> Array:
     """(V,) steps n at which wave/n + phase(angle/n) = pi, found once: a march, its reference and its audit all ask."""
     return np.frombuffer(_alias_roots((scheme, wave, angle.tobytes())))
