@@ -9,7 +9,7 @@ _MESSAGES = (
     "the error could not be estimated; values kept",
     "the estimated error is larger than the tolerance; values kept",
     "an eigenvalue, tie or Newton solution did not converge; no values",
-    "the march left the finite numbers; no values",
+    "what swings grew beyond all numbers, by itself or by steps that are too long; no values",
     "the worker died in this variant; no values",
     "a body turns too fast without stiffening by its rotation, buckles under its weight, or bends too far for small "
     "deflections; values kept",

@@ -120,7 +120,7 @@ def pace_of_waves(model: SceneModel, time_scale: Array) -> Array:
     found = np.zeros_like(time_scale)
     for carriage in model.carriages:
         body = model.bodies[carriage.body].modal
-        if carriage.inertia != "force":
+        if carriage.inertia != "force" and body.omega.any():
             wave = float(np.max(body.wave_number)) * carriage.rider.top_speed
             found = np.maximum(found, wave / (float(body.omega.max()) * time_scale))
     return found

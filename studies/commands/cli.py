@@ -214,7 +214,11 @@ def export(archive: Path, file: Path, names: str, overwrite: bool) -> None:
     left_out = write_table(results_of(open_archive(archive)), file, chosen, overwrite=overwrite)
     console.say(
         f"wrote {file}",
-        *([f"without what has other dimensions than its rows: {', '.join(left_out)}"] if left_out else []),
+        *(
+            [f"without what has other dimensions than its rows, in the archive: {', '.join(left_out)}"]
+            if left_out
+            else []
+        ),
     )
 
 

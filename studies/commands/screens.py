@@ -327,7 +327,14 @@ def _about_statuses(results: Results) -> Iterator[str]:
             part = "as the study expects, " if label(status) in expected else ""
             most, helps = (missed_most(results), remedy(results)) if status is Status.TOLERANCE_MISSED else ("", "")
             many = f"{counted(count, noun)} of {sum(counts.values()):,} {label(status)}"
-            yield f"{many}: {part}{status.message}{most}.{helps}"
+            also = _opened_besides(results, count) if status is Status.SEPARATED else ""
+            yield f"{many}: {part}{status.message}{most}.{also}{helps}"
+
+
+def _opened_besides(results: Results, told: int) -> str:
+    """In how many variants more than their status tells a contact opens, as it tells the gravest alone."""
+    more = int((results.kept.values & ~results.held).sum()) - told
+    return f" So it is in {counted(more, 'variant')} more, whose status tells something else first." if more > 0 else ""
 
 
 def _about_work(outcome: Outcome) -> str:

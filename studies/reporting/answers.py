@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, NamedTuple
 from results_schema.lazy_imports import xr
 from studies.findings.cells import findings_of_cells
 from studies.findings.envelopes import beyond_sensors, told_envelopes
-from studies.findings.numerics_used import told_choices
+from studies.findings.numerics_used import is_marched, told_choices
 from studies.protocol.study import kind_named
 from studies.results.checks import check_named
-from studies.results.findings_common import told_statuses
+from studies.results.findings_common import told_far, told_statuses
 from studies.results.results import Results
 
 if TYPE_CHECKING:
@@ -69,7 +69,10 @@ def _findings(results: Results) -> list[str]:
     """What the kind of study finds, or what is known of cells of variants."""
     if not results.study.output.keeps_variants:
         return findings_of_cells(results)
-    return kind_named(results.study.kind).findings(results)
+    kind = kind_named(results.study.kind)
+    said = kind.findings(results)
+    far = told_far(results) if is_marched(results.dataset) and not kind.moves_frames else []
+    return [*said[:1], *far, *said[1:]]
 
 
 def figures_of(results: Results) -> list[Figure]:

@@ -11,8 +11,8 @@ from engine.scene.study import Study
 from results_schema.arrays import Array
 from results_schema.quantities import AFTER_STOP
 from results_schema.status import Status, label
-from studies.results.formatting import counted, listed, percent, quantity, scientific
-from studies.results.places import Index
+from studies.results.formatting import counted, listed, number, percent, quantity, scientific
+from studies.results.places import Index, extreme
 from studies.results.results import Results, statuses
 
 MOST_MISSED = 3  # sensors that are named where tolerances are missed
@@ -160,6 +160,23 @@ def tolerance_for(error: float) -> str:
         return '"told"'
     decade = 10.0 ** np.floor(np.log10(error))
     return f"{next(part * decade for part in (1.0, 2.0, 5.0, 10.0, 20.0) if part * decade >= ROOM * error):g}"
+
+
+def told_far(results: Results) -> list[str]:
+    """In how many variants something deflects by more than the longest body is long; nothing where in none: what shakes
+    its body more and more, or has a wrong unit, was told without a word on it."""
+    length = max(body.length for body in results.study.body.values())
+    part = np.zeros(results.shape)
+    for name in (f"{name}_{end}" for name, units in results.sensors.items() if units == "m" for end in ("max", "min")):
+        part = np.fmax(part, np.where(results.kept.values, np.abs(results.everywhere(results.dataset[name])), 0.0))
+    place = extreme(part)
+    if place is None or not part[place] > length:
+        return []
+    return [
+        f"In {int(np.sum(part > length)):,} of {counted(results.size, 'variant')} deflections are up to "
+        f"{number(float(part[place]) / length)} times as large as the longest body{in_words(results, place)}: no "
+        "structure bends so far, and these equations hold for small deflections."
+    ]
 
 
 def told_statuses(results: Results) -> list[str]:

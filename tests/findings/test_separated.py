@@ -11,6 +11,7 @@ import studies
 from engine.scene.study import Study
 from results_schema.errors import BadInput
 from results_schema.status import Status
+from studies.commands.screens import _about_statuses
 from studies.findings.contacts import told_contacts
 from studies.kinds.double_peak import KIND as DOUBLE_PEAK
 from studies.moving.findings import others, sliding
@@ -224,3 +225,15 @@ def test_wheels_that_stay_level_may_only_seem_to_lift_off(place: float, seems: b
 @pytest.mark.parametrize("reason", ["lift off", "over an end of its track"])
 def test_the_status_says_both_reasons_that_it_has(reason: str) -> None:
     assert reason in Status.SEPARATED.message
+
+
+def test_a_status_that_comes_first_hides_no_contact_that_opens() -> None:
+    """ "5 separated" stood beside "would lift off in 7", as a missed tolerance is told first."""
+    mass = 'mass = { of = "carriage.table.mass", values = [10, 600, 600] }'
+    pace = 'pace = { of = "carriage.table.motion.speed", values = [1, 20, 25] }'
+    dataset = scenes.run("passage", f"zip = true\n{pace}\n{mass}")
+    opened = np.flatnonzero(dataset.status.values == Status.SEPARATED)
+    assert opened.size == 2 and "whose status" not in " ".join(_about_statuses(Results.of(dataset)))
+    dataset.status.values[opened[0]] = Status.TOLERANCE_MISSED
+    said = list(_about_statuses(Results.of(dataset)))
+    assert any("So it is in 1 variant more, whose status tells something else first." in text for text in said)

@@ -58,6 +58,7 @@ def test_answers_say_so_and_tell_no_number_of_cycles() -> None:
     text = said(shaken(0.75))
     factor = growth_per_cycle(shaken(0.75), np.array([0]))[0]
     assert f"In 1 of 1 variant the vibration grows from cycle to cycle, by up to {factor:.3g} times" in text
+    assert "times as large as the longest body: no structure bends so far" in text
     assert "would be enough" not in text and "of the start's vibration is left" not in text
     assert "grows from cycle to cycle" not in said(shaken(0.4))
 
