@@ -17,6 +17,7 @@ import numpy as np
 
 from engine.accuracy.results import results_of
 from engine.batch.audit import SEED, audit
+from engine.batch.plan import Plan
 from engine.linear_algebra import one_thread
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
@@ -55,11 +56,16 @@ def rows_of(seed: int, size: int, tolerance: float, fixed: bool, number: int) ->
         plan = planned(with_fixed(given, seed, number) if fixed else given)
     except BadInput:
         return []
+    return rows_of_plan(plan, number, GROUPS[reads_moment(number)], tolerance)
+
+
+def rows_of_plan(plan: Plan, number: int, group: str, tolerance: float) -> list[Row]:
+    """The rows of a scene that is planned, by its number."""
     picked = judged(plan, JUDGED, [SEED, number])
     found = audit(plan, picked)
     held = np.array([np.isfinite(result.tolerance) for result in results_of(plan.asked)])
     observed, told, doubt = (part[held] / tolerance for part in (found.observed, found.told, found.doubt))
-    group, rows = GROUPS[reads_moment(number)], []
+    rows = []
     for v in range(found.variants.size):
         marked = bool(np.nanmax(told[:, v]) > 1.0 or np.isnan(told[:, v]).any())
         rows.append(row_of(number, group, marked, observed[:, v], told[:, v], doubt[:, v]))
