@@ -25,12 +25,13 @@ from results_schema.arrays import Array, Counts
 #: Modes of bodies that leave them open, and least steps of a cycle: of a map of a swinging mass with 2 % damping they
 #: judge none of 280 cells otherwise than 24 modes and 6,400 steps.
 MODES, STEPS = 12, 1200
+MOST_STEPS = 24_000  # of all cycles that are marched: a slower motion shakes nothing, and 64 of these take a second
 GROWS = 1.0 + 1e-3  # rounding and steps make less of what does not grow
 
 
 def growth_per_cycle(study: Study, variants: Counts) -> Array:
     """(variants,) the largest Floquet multipliers of some variants of a study, by their flat numbers; NaN where they
-    are not known here: of several carriages, of forces, and of bodies out of files."""
+    are not known here: of several carriages, of forces, of bodies out of files, and of cycles of very many steps."""
     found = np.full(variants.size, np.nan)
     if not variants.size or not _is_known(study):
         return found
@@ -41,10 +42,14 @@ def growth_per_cycle(study: Study, variants: Counts) -> Array:
     for scene, some in scenes(own, cases, np.sort(variants)):
         model = with_numerics(scene, numerics)
         values = VariantValues.of(model.study, cases, some)
-        steps = math.ceil(max(STEPS, float(least_steps(model, values).max())))
-        radius = spectral_radius(transitions(SceneTables(model, steps, "whole"), values))
-        here = np.isin(variants, some)
-        found[here] = radius[np.searchsorted(some, variants[here])] ** (1.0 / model.study.value(key))
+        cycles = int(model.study.value(key))
+        steps = np.maximum(STEPS, least_steps(model, values))
+        few = np.flatnonzero(steps * cycles <= MOST_STEPS)
+        if few.size:
+            tables = SceneTables(model, math.ceil(steps[few].max()), "whole")
+            radius = spectral_radius(transitions(tables, values.part(few))) ** (1.0 / cycles)
+            here = np.isin(variants, some[few])
+            found[here] = radius[np.searchsorted(some[few], variants[here])]
     return found
 
 

@@ -10,7 +10,7 @@ from pydantic import Field, Strict
 from engine.methods.cycle_growth import GROWS, growth_per_cycle
 from engine.study_file.spec import Spec
 from engine.study_file.units import Dimensionless
-from results_schema.arrays import Array, Mask
+from results_schema.arrays import Array, Counts, Mask
 from results_schema.status import Fidelity
 from studies.findings import theory
 from studies.protocol.study import question_of
@@ -22,7 +22,7 @@ from studies.results.results import Results
 BASIS = 12  # modes of the body, of whose vibrations with mass and dampers the slowest decay counts
 SLOW = 6  # eigenvalues of these, the smallest: three vibrations, of which the third swings by a hundredth of the first
 FAR_ABOVE = 2.0  # times the static value: what vibrates so much may grow from cycle to cycle
-MOST_GROWING = 256  # variants of which that is asked, about a tenth of a second
+MOST_GROWING = 128  # variants of which that is asked: some milliseconds, two seconds where each has a scene of its own
 SHOWN = 3  # sensors, of many, that sentences and figures are about
 MOST = 1000  # different bodies, masses and dampers in a sweep, an eighth of a second; of more no decay is known
 PLACES = 65  # along the way, at the heaviest of which the mass stands: there the vibration dies out the slowest
@@ -71,14 +71,19 @@ def _died_out(results: Results) -> Array:
 def growth(results: Results) -> Array:
     """By how much the vibration grows from cycle to cycle, in the sweep's shape, of the variants whose start has not
     died out, or which are far above statics or diverged: of many those furthest above; NaN elsewhere."""
+    asked, found = _doubted(results)[:MOST_GROWING], np.full(results.size, np.nan)
+    found[asked] = growth_per_cycle(results.study, asked)
+    return found.reshape(results.shape)
+
+
+def _doubted(results: Results) -> Counts:
+    """Flat numbers of these variants, the furthest above statics first."""
     above = next(name for name in ("dynamic_amplification", "odd_rms") if name in results.dataset)
     gains = [results.everywhere(results.of_sensor(above, name)) for name in results.sensors]
     gain = np.where(results.kept.values, np.max(np.nan_to_num(gains), axis=0), np.inf).ravel()
     doubted = (gain > FAR_ABOVE) | (_died_out(results).ravel() > results.study.solver.tolerance)
     furthest = np.argsort(-gain, kind="stable")
-    asked, found = furthest[doubted[furthest]][:MOST_GROWING], np.full(results.size, np.nan)
-    found[asked] = growth_per_cycle(results.study, asked)
-    return found.reshape(results.shape)
+    return np.asarray(furthest[doubted[furthest]])
 
 
 def told_growing(results: Results) -> list[str]:
@@ -87,12 +92,15 @@ def told_growing(results: Results) -> list[str]:
     grows, place = factor > GROWS, extreme(factor)
     if place is None or not grows.any():
         return []
+    least = "at least " * (_doubted(results).size > MOST_GROWING)
     most = times(float(factor[place])) if np.isfinite(factor[place]) else "beyond all numbers"
+    who = (
+        f"In {least}{int(grows.sum()):,} of {counted(results.size, 'variant')} the vibration grows from cycle to cycle"
+    )
     return [
-        f"In {int(grows.sum()):,} of {counted(results.size, 'variant')} the vibration grows from cycle to cycle, by up "
-        f"to {most} (the largest Floquet multiplier{in_words(results, place)}): the mass that goes to and fro shakes "
-        "its body. What is said of these depends on how many cycles are marched, and no number of cycles settles them; "
-        "more damping, another mass or another frequency may."
+        f"{who}, by up to {most} (the largest Floquet multiplier{in_words(results, place)}): the mass that goes to and "
+        "fro shakes its body. What is said of these depends on how many cycles are marched, and no number of cycles "
+        "settles them; more damping, another mass or another frequency may."
     ]
 
 
