@@ -181,7 +181,8 @@ def converge(
             stays = STAYS if is_corrected else STAYS_UNCORRECTED
             remaining = np.maximum(remaining, left_along(apart, change[:, active], stays))
         remaining = np.maximum(remaining, between_peaks(asked, now))
-        remaining[:, pace_of_waves(model, own.scene_time_scale) > OUTRUN] = np.nan
+        if levels.numerics[level].modes or levels.numerics[level].more > 1:  # what a study fixes has its error by more
+            remaining[:, pace_of_waves(model, own) > OUTRUN] = np.nan
         found = _updated(found, active, now, spent, remaining)
         change[:, active] = apart
         off = worst_held(remaining, decisive, own.tighter)

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from engine.kernels.schemes import damps_contacts, is_damped
+from engine.model.lane_table import moving_mass
 from results_schema.arrays import Array, Counts
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ LIMIT_MARGIN = 1.05  # a conditionally stable scheme stays this far inside its l
 LEAST_MARGIN = 1.1
 MOST_STEPS = 100_000_000  # over one passage or cycle: a variant of so many takes minutes
 SLOWEST = 200  # steps per first period that a study whose steps are open must be able to take within that
+LIGHT = 1e-3  # of the modal masses where it rides: the waves of a lighter mass are those of its weight
 ALIAS_CELL = 0.01  # of a time scale: the alias rule is solved once for variants that are no further apart
 
 
@@ -114,15 +116,17 @@ def alias_steps(model: SceneModel, time_scale: Array) -> Array:
     return model.scheme.stride * found
 
 
-def pace_of_waves(model: SceneModel, time_scale: Array) -> Array:
+def pace_of_waves(model: SceneModel, values: VariantValues) -> Array:
     """(V,) the largest speed of a mass that rides over the phase speed of its body's highest wave that is kept,
-    v k_N/omega_N: of a uniform beam speed over critical speed and number of modes; 0 without any."""
-    found = np.zeros_like(time_scale)
-    for carriage in model.carriages:
+    v k_N/omega_N: of a uniform beam speed over critical speed and number of modes; 0 of masses that move nothing."""
+    found = np.zeros(values.size)
+    for number, carriage in enumerate(model.carriages):
         body = model.bodies[carriage.body].modal
         if carriage.inertia != "force" and body.omega.any():
             wave = float(np.max(body.wave_number)) * carriage.rider.top_speed
-            found = np.maximum(found, wave / (float(body.omega.max()) * time_scale))
+            own = wave / (float(body.omega.max()) * values.scene_time_scale)
+            heavy = moving_mass(model, values, number) * body.mobility > LIGHT
+            found = np.where(heavy, np.maximum(found, own), found)
     return found
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from engine.model.ties import Attachment, Load, SpringTie
-from engine.scene.variants import SpringKeys, contact_stiffness_keys
+from engine.scene.variants import APART, SpringKeys, contact_stiffness_keys
 from results_schema.arrays import Array
 from results_schema.errors import BadInput
 
@@ -152,13 +152,15 @@ def _places_in_words(study: Study, name: str) -> str:
 def _check_determinate(study: Study, name: str, modal: ModalBody, springs: Sequence[SpringTie]) -> None:
     """Refuse contacts that share the weight by stiffnesses which are the variants' own."""
     held = np.stack([spring.held.fixed_row(modal)[modal.omega == 0.0] for spring in springs if spring.held])
-    if any(spring.varies for spring in springs) and np.linalg.matrix_rank(held) < len(held):
+    sizes = np.abs(held).max(axis=0)
+    held = held / np.where(sizes > UNMOVED * sizes.max(), sizes, sizes.max())
+    if any(spring.varies for spring in springs) and np.linalg.matrix_rank(held, tol=APART) < len(held):
         raise study.source.fault(
             f"carriage.{name}.contacts",
             "these contacts share what they carry by their stiffnesses, which the sweep varies",
             expected="contacts at different places of a body that is free to heave and to pitch",
             received=_places_in_words(study, name),
-            remedy=f"body.{study.carriage[name].riding_body}.modes = 2 or more, or one stiffness for all variants",
+            remedy="points further apart, or one stiffness for all variants",
         )
 
 

@@ -20,6 +20,8 @@ from engine.study_file.units import exponents_of
 from results_schema.arrays import Array, Counts
 
 if TYPE_CHECKING:
+    from engine.bodies.modal.description import Body
+    from engine.scene.carriages import Contact
     from engine.scene.study import Study
     from engine.scene.sweep import Axis, Cases
 
@@ -102,6 +104,7 @@ def modal_mass_keys(study: Study) -> dict[str, tuple[str, ...]]:
 
 #: Contacts on which a body that nothing else holds stands so that their forces at rest follow from weights alone.
 DETERMINATE = 2
+APART = 1e-6  # of its length: contacts nearer to each other share what they carry by rounding, if not by stiffness
 
 
 def contact_stiffness_keys(study: Study) -> tuple[str, ...]:
@@ -110,11 +113,18 @@ def contact_stiffness_keys(study: Study) -> tuple[str, ...]:
     found = list[str]()
     for name, carriage in study.carriage.items():
         contacts = carriage.riding_contacts
-        apart = len({contact.place for contact in contacts.values()}) == len(contacts) <= DETERMINATE
-        if carriage.riding_body is not None and not (apart and study.body[carriage.riding_body].is_free):
+        if carriage.riding_body is not None and not _is_determinate(study.body[carriage.riding_body], contacts):
             return ()
         found += (SpringKeys.of_contact(name, word).stiffness for word, own in contacts.items() if not own.is_rigid)
     return tuple(found)
+
+
+def _is_determinate(body: Body, contacts: Mapping[str, Contact]) -> bool:
+    """Whether it is known that a body is free, heaves and pitches, and has no more contacts than it takes, apart."""
+    places = [contact.at for contact in contacts.values() if contact.at is not None]
+    apart = len(places) < DETERMINATE or abs(places[0] - places[1]) > APART * body.length
+    moves = body.modes == "auto" or int(body.modes) >= DETERMINATE
+    return body.is_free and moves and apart and len(contacts) <= DETERMINATE
 
 
 def structural(study: Study, cases: Cases) -> list[str]:

@@ -15,13 +15,13 @@ from results_schema.status import Fidelity
 from studies.findings import theory
 from studies.protocol.study import question_of
 from studies.results.findings_common import in_words
-from studies.results.formatting import counted, percent, times
+from studies.results.formatting import counted, number, percent
 from studies.results.places import chosen, extreme
 from studies.results.results import Results
 
 BASIS = 12  # modes of the body, of whose vibrations with mass and dampers the slowest decay counts
 SLOW = 6  # eigenvalues of these, the smallest: three vibrations, of which the third swings by a hundredth of the first
-FAR_ABOVE = 2.0  # times the static value: what vibrates so much may grow from cycle to cycle
+FAR_ABOVE = 2.0  # times the static value, or parts of its range: what vibrates so much may grow from cycle to cycle
 MOST_GROWING = 128  # variants of which that is asked: some milliseconds, two seconds where each has a scene of its own
 SHOWN = 3  # sensors, of many, that sentences and figures are about
 MOST = 1000  # different bodies, masses and dampers in a sweep, an eighth of a second; of more no decay is known
@@ -82,6 +82,7 @@ def _doubted(results: Results) -> Counts:
     gains = [results.everywhere(results.of_sensor(above, name)) for name in results.sensors]
     gain = np.where(results.kept.values, np.max(np.nan_to_num(gains), axis=0), np.inf).ravel()
     doubted = (gain > FAR_ABOVE) | (_died_out(results).ravel() > results.study.solver.tolerance)
+    doubted &= ~np.isin(results.dataset["fidelity_used"].values.ravel(), (Fidelity.STATIC, Fidelity.FORCE))
     furthest = np.argsort(-gain, kind="stable")
     return np.asarray(furthest[doubted[furthest]])
 
@@ -92,15 +93,15 @@ def told_growing(results: Results) -> list[str]:
     grows, place = factor > GROWS, extreme(factor)
     if place is None or not grows.any():
         return []
-    least = "at least " * (_doubted(results).size > MOST_GROWING)
-    most = times(float(factor[place])) if np.isfinite(factor[place]) else "beyond all numbers"
-    who = (
-        f"In {least}{int(grows.sum()):,} of {counted(results.size, 'variant')} the vibration grows from cycle to cycle"
-    )
+    asked = min(_doubted(results).size, MOST_GROWING)
+    of = f", of {asked} that were looked at," if asked < _doubted(results).size else ""
+    most = f"up to {number(float(factor[place]), 4)}" if np.isfinite(factor[place]) else "very many"
+    who = f"In {int(grows.sum()):,} of {counted(results.size, 'variant')}{of} the vibration grows"
     return [
-        f"{who}, by up to {most} (the largest Floquet multiplier{in_words(results, place)}): the mass that goes to and "
-        "fro shakes its body. What is said of these depends on how many cycles are marched, and no number of cycles "
-        "settles them; more damping, another mass or another frequency may."
+        f"{who}: after each cycle it is {most} times what it was (the largest Floquet multiplier"
+        f"{in_words(results, place)}), as the mass that goes to and fro shakes its body. What is said of these depends "
+        "on how many cycles are marched, and no number of cycles settles them; more damping, another mass or another "
+        "frequency may."
     ]
 
 

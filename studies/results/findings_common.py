@@ -167,7 +167,7 @@ def told_far(results: Results) -> list[str]:
     its body more and more, or has a wrong unit, was told without a word on it."""
     length = max(body.length for body in results.study.body.values())
     part = np.zeros(results.shape)
-    for name in (f"{name}_{end}" for name, units in results.sensors.items() if units == "m" for end in ("max", "min")):
+    for name in (f"{name}_{end}" for name in results.sensors if _bends(results, name) for end in ("max", "min")):
         part = np.fmax(part, np.where(results.kept.values, np.abs(results.everywhere(results.dataset[name])), 0.0))
     place = extreme(part)
     if place is None or not part[place] > length:
@@ -177,6 +177,12 @@ def told_far(results: Results) -> list[str]:
         f"{number(float(part[place]) / length)} times as large as the longest body{in_words(results, place)}: no "
         "structure bends so far, and these equations hold for small deflections."
     ]
+
+
+def _bends(results: Results, sensor: str) -> bool:
+    """Whether a sensor reads how far a body bends that something holds, at a place of its own."""
+    spec, body = results.study.sensor[sensor], results.study.body[results.study.body_of(sensor)]
+    return results.sensors[sensor] == "m" and spec.carriage is None and not body.is_free
 
 
 def told_statuses(results: Results) -> list[str]:

@@ -23,7 +23,7 @@ def passing(times: float, kilograms: float = 0.5) -> Study:
 def test_of_a_beam_it_is_speed_over_critical_speed_and_number_of_modes() -> None:
     (grid,) = make_plan(passing(8.0)).grids
     model = grid.model(grid.scene.numerics._replace(modes=16))
-    assert pace_of_waves(model, grid.values.scene_time_scale) == pytest.approx([8.0 / 16.0])
+    assert pace_of_waves(model, grid.values) == pytest.approx([8.0 / 16.0])
 
 
 def test_where_all_modes_are_outrun_no_estimate_exists() -> None:

@@ -91,10 +91,13 @@ def test_studies_that_read_statics_know_it(kind: str) -> None:
 
 
 HELD: Table = FRAME | {"supports": {"rear": ["x"]}}
+NEAR = {"rear": TWO["rear"] | {"at": 0.2}, "front": TWO["front"] | {"at": 0.2 + 1e-12}}
 SHARED: dict[str, Callable[[Table], Study]] = {
     "three contacts": lambda sweep: riding(
         WAY, {"rear": THREE["a"], "b": THREE["b"], "front": THREE["c"]}, sweep=sweep
     ),
+    "one mode": lambda sweep: riding(WAY, table=FLEXIBLE | {"modes": 1}, sweep=sweep),
+    "at next to one place": lambda sweep: riding(WAY, NEAR, sweep=sweep),
     "a body that something holds": lambda sweep: riding(WAY, SHOES, HELD, sweep=sweep),
 }
 
@@ -106,11 +109,12 @@ def test_contacts_that_share_weights_by_their_stiffnesses_make_scenes(name: str)
 
 
 def test_contacts_that_a_body_cannot_tell_apart_are_refused() -> None:
-    """Of one mode, heave, a table presses all its contacts by their stiffnesses."""
-    stiff = FLEXIBLE | {"modes": 1}
+    """At two points of one place: which of them carries how much follows from their stiffnesses."""
+    ends = {"rear_shoe": ("foot", 0.2), "front_shoe": ("toe", -0.2)}
+    one = {"point": {name: {"node": node, "offset": [ahead, 0.0, 0.0]} for name, (node, ahead) in ends.items()}}
     with pytest.raises(BadInput, match="share what they carry"):
-        make_plan(riding(WAY, table=stiff, sweep=SWEPT))
-    make_plan(riding(WAY, table=stiff))
+        make_plan(riding(WAY, SHOES, FRAME | one, sweep=SWEPT))
+    make_plan(riding(WAY, SHOES, FRAME | one))
 
 
 def test_four_wheels_of_a_gantry_make_scenes() -> None:
