@@ -122,7 +122,7 @@ MARCH = outputs("""
         NaN where the contact holds
     {sensor} | position/phase/station | {sensor} | optional history gaps | history of {sensor}
         at the instants of `elapsed`; NaN where a sensor under a carriage is off the body
-    {carriage}_position | position/phase/station | m | optional history gaps | position of {carriage}
+    {carriage}_position | position/phase/station | m | optional history nan | position of {carriage}
         NaN where it is off the body
     {envelope}_envelope_max | {envelope}_place | {envelope} | | largest value at each place of {envelope}
         over the instants over which extremes of sensors are taken

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import engine
+import studies
 from engine.batch.plan import make_plan
 from engine.march.richardson import march_scheme
 from engine.march.tables import SceneTables
@@ -180,3 +181,11 @@ def test_a_segment_has_the_ties_of_the_carriages_on_their_bodies_alone(read: boo
         one = on.get(active, 0)
         assert table.numbers.tolist() == ([one, 3] if read or one == 2 else [one])
         assert table.ties.rows.shape[2] == table.watch.static.shape[2] == len(table.numbers)
+
+
+def test_one_that_has_crossed_before_the_last_cycle_has_no_place_in_it() -> None:
+    """Its history, NaN throughout, ended the whole run after the march."""
+    crossing = {"car": mass(0.3, shuttle(0.2, 0.8, 0.5, 0.1, 2)), "other": mass(0.1, cruise(0.0, 1.0, 0.7))}
+    case = study(beam(modes=3), crossing, kind="asymmetry", sensor={"middle": fixed(0.5)}, output={"histories": "all"})
+    found = studies.run(case)
+    assert np.isnan(found.other_position).all() and np.isfinite(found.car_position).all()
