@@ -304,10 +304,7 @@ def _largest_static(unit: Array, loads: Array) -> Array:
     found = np.empty(loads.shape[1])
     for first in range(0, found.size, 1024):
         part = slice(first, first + 1024)
-        reading = np.zeros((len(unit), found[part].size))
-        for own, load in zip(unit.T, loads[:, part], strict=True):
-            reading += own[:, None] * load
-        found[part] = np.abs(reading).max(axis=0)
+        found[part] = np.abs(_of_loads(unit[:, None], loads[:, part])[:, 0]).max(axis=0)
     return found
 
 

@@ -212,14 +212,8 @@ def export(archive: Path, file: Path, names: str, overwrite: bool) -> None:
 
     chosen = [name.strip() for name in names.split(",") if name.strip()]
     left_out = write_table(results_of(open_archive(archive)), file, chosen, overwrite=overwrite)
-    console.say(
-        f"wrote {file}",
-        *(
-            [f"without what has other dimensions than its rows, in the archive: {', '.join(left_out)}"]
-            if left_out
-            else []
-        ),
-    )
+    other = f"without what has other dimensions than its rows, in the archive: {', '.join(left_out)}"
+    console.say(f"wrote {file}", *([other] if left_out else []))
 
 
 @commands.command()

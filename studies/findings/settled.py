@@ -67,7 +67,7 @@ def _died_out(results: Results) -> Array:
     return np.asarray(np.exp(-decay_rates(results) * theory.cycle_time(results) * (theory.cycles(results) - 1.0)))
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=1)
 def growth(results: Results) -> Array:
     """By how much the vibration grows from cycle to cycle, in the sweep's shape, of the variants whose start has not
     died out, or which are far above statics or diverged: of many those furthest above; NaN elsewhere."""

@@ -148,7 +148,9 @@ def sentences(dataset: xr.Dataset) -> list[str]:
 
 
 def _certainty(dataset: xr.Dataset, damping: str) -> str:
-    """How much of the map two thirds of the modes judge otherwise."""
+    """How much of the map two thirds of the modes judge otherwise; of archives written before that is not known."""
+    if "multiplier_fewer_modes" not in dataset:
+        return "How much of it fewer modes judge otherwise is not known."
     whole, fewer = (dataset[name].fillna(np.inf) > UNSTABLE for name in ("multiplier", "multiplier_fewer_modes"))
     otherwise = (whole != fewer).mean(["shuttle_mass_ratio", "shuttle_frequency_ratio"])
     parts = [percent(float(part)) for part in otherwise.values]

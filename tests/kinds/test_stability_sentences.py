@@ -64,7 +64,7 @@ def test_the_contact_opens_first_and_may_hold_again() -> None:
     assert said.endswith("The other masses hold up to speed ratio 0.4.")
 
 
-def shuttle_said(free: list[float], damped: list[float], low: float) -> str:
+def shuttle_map(free: list[float], damped: list[float], low: float) -> xr.Dataset:
     mass, frequency = "shuttle_mass_ratio", "shuttle_frequency_ratio"
     data = {
         "multiplier": (("shuttle_damping_ratio", mass, frequency), [[free], [damped]]),
@@ -74,7 +74,16 @@ def shuttle_said(free: list[float], damped: list[float], low: float) -> str:
         "tongue_theory": (mass, [0.8]),
     }
     along = {"shuttle_damping_ratio": [0.0, 0.02], mass: [0.5], frequency: np.arange(len(free)) * 0.1}
-    return " ".join(shuttle.sentences(xr.Dataset(data, along)))
+    return xr.Dataset(data, along)
+
+
+def shuttle_said(free: list[float], damped: list[float], low: float) -> str:
+    return " ".join(shuttle.sentences(shuttle_map(free, damped, low)))
+
+
+def test_archives_without_a_map_of_fewer_modes_are_told() -> None:
+    written_before = shuttle_map([1.0, 2.0], [1.0, 1.5], 0.75).drop_vars("multiplier_fewer_modes")
+    assert "How much of it fewer modes judge otherwise is not known." in " ".join(shuttle.sentences(written_before))
 
 
 def test_the_swinging_mass_names_a_main_band_and_the_share_of_the_map() -> None:

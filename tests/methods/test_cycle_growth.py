@@ -26,7 +26,7 @@ def shaken(frequency: float, kilograms: float = 0.5, cycles: int = 10, **more: A
 
 
 def test_it_is_what_one_cycle_more_brings() -> None:
-    """Largest readings after 11 and 12 cycles, and by the map's own scene."""
+    """Largest readings of the 12th and the 13th cycle, and by the map's own scene."""
     told = float(growth_per_cycle(shaken(0.75), np.array([0]))[0])
     sizes = [float(studies.run(shaken(0.75, cycles=cycles)).midspan_max) for cycles in (12, 13)]
     assert told > 1.4 and sizes[1] / sizes[0] == pytest.approx(told, rel=1e-2)
