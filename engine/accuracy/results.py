@@ -16,7 +16,7 @@ from engine.march.envelopes import envelope_names
 from engine.march.settling import names_of_times
 from engine.model.lane_table import weights
 from engine.observation.contact_forces import contacts_that_react
-from engine.observation.cycle_reduction import HISTORY_PART, Compared
+from engine.observation.cycle_reduction import HISTORY_PART, OF_MEAN_SQUARES, Compared
 from results_schema.arrays import Array
 from results_schema.gravest_status import lost
 from results_schema.quantities import QUANTITIES
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from engine.scene.variants import VariantValues
 
 
-EXTREMES, RESIDUAL = ("max", "min", "rms"), ("residual",)
 ENDS = ("max", "min")
 
 
@@ -49,8 +48,9 @@ class Result(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class Pair:
     """Two outcomes of the same variants of a scene. apart (S, V): the largest difference of the histories of every
-    signal at common stations, usually (S, V): what all but a few stations differ by at most. Its methods tell by how
-    much a result differs, (V,), over the scale that the second has.
+    signal at common stations, usually (S, V): what all but a few stations differ by at most. part: of the latter that
+    values on histories are off by at least. Its methods tell by how much a result differs, (V,), over the scale that
+    the second has.
     """
 
     asked: Asked
@@ -60,6 +60,7 @@ class Pair:
     other: Outcome
     apart: Array
     usually: Array
+    part: float = HISTORY_PART
 
     def gap(self, name: str) -> Array:
         """|difference| of a result; 0 where neither has a number, infinite where only one has."""
@@ -67,9 +68,14 @@ class Pair:
         gap: Array = np.where(np.isnan(left) & np.isnan(right), 0.0, np.abs(left - right))
         return np.where(np.isnan(gap), np.inf, gap)
 
-    def reading(self, name: str, sensor: int) -> Array:
-        """An extreme or root mean square of a sensor, no less than a part of what its histories differ by."""
-        gap = np.maximum(self.gap(name), HISTORY_PART * self.usually[sensor])
+    def extreme(self, name: str, sensor: int) -> Array:
+        """An extreme of a sensor, no less than a part of what its histories differ by."""
+        gap = np.maximum(self.gap(name), self.part * self.usually[sensor])
+        return np.asarray(gap / self.other.scale[:, sensor])
+
+    def mean_square(self, name: str, sensor: int) -> Array:
+        """A root mean square of a sensor, likewise."""
+        gap = np.maximum(self.gap(name), OF_MEAN_SQUARES * self.part * self.usually[sensor])
         return np.asarray(gap / self.other.scale[:, sensor])
 
     def place(self, name: str) -> Array:
@@ -97,7 +103,7 @@ class Pair:
         forces = contacts_that_react(self.model)
         histories = self.usually[len(self.usually) - len(forces) :]
         apart = histories[[force.carriage == carriage for force in forces]].max(axis=0, initial=0.0)
-        return _over(np.maximum(self.gap(name), HISTORY_PART * apart), np.abs(self._weights[carriage]))
+        return _over(np.maximum(self.gap(name), self.part * apart), np.abs(self._weights[carriage]))
 
     def envelope(self, name: str) -> Array:
         """Extremes along a body, over the largest anywhere."""
@@ -115,10 +121,11 @@ class Pair:
     def _cycles(self) -> Mapping[str, Array]:
         assert self.asked.reduction is not None
         apart = self.apart[: len(self.asked.study.sensor)]
-        compared = Compared(self.one.numbers, self.other.numbers, self.other.scale, apart, self.values)
+        compared = Compared(self.one.numbers, self.other.numbers, self.other.scale, apart, self.values, self.part)
         return self.asked.reduction.differences(compared)
 
 
+READINGS, RESIDUAL = {"max": Pair.extreme, "min": Pair.extreme, "rms": Pair.mean_square}, {"residual": Pair.extreme}
 Entry = tuple[Result, Callable[[Pair], Array]]  # and how far it is apart
 
 
@@ -126,8 +133,8 @@ def _of_sensors(asked: Asked) -> Iterator[Entry]:
     for j, (name, sensor) in enumerate(asked.study.sensor.items()):
         extreme, history = _held_of(asked, sensor, "extreme"), _held_of(asked, sensor, "history")
         slow = _is_slow(asked, sensor)
-        for own in (f"{name}_{end}" for end in EXTREMES + RESIDUAL * asked.study.output.residual):
-            yield Result(own, name, *extreme, slow), partial(Pair.reading, name=own, sensor=j)
+        for end, apart in (READINGS | RESIDUAL if asked.study.output.residual else READINGS).items():
+            yield Result(f"{name}_{end}", name, *extreme, slow), partial(apart, name=f"{name}_{end}", sensor=j)
         for own in (f"{name}_{end}_position" for end in ENDS):
             yield Result(own, name), partial(Pair.place, name=own)
         for own in (f"{name}_{end}_time" for end in ENDS * asked.study.output.times):
@@ -213,11 +220,14 @@ def between_peaks(asked: Asked, own: Outcome) -> Array:
     return found
 
 
-def differences(asked: Asked, model: SceneModel, values: VariantValues, one: Outcome, other: Outcome) -> Array:
-    """(R, V) how far two outcomes of the same variants are apart, by result: over the scale of each that ``other`` has.
-    Infinite where only ``one`` has diverged, NaN where the other has."""
+def differences(
+    asked: Asked, model: SceneModel, values: VariantValues, one: Outcome, other: Outcome, part: float = HISTORY_PART
+) -> Array:
+    """(R, V) how far two outcomes of the same variants are apart, by result: over the scale of each that ``other`` has;
+    values on histories by ``part`` of what these differ by, at least. Infinite where only ``one`` has diverged, NaN
+    where the other has."""
     with np.errstate(invalid="ignore", over="ignore"):  # of those that have diverged
-        pair = Pair(asked, model, values, one, other, *_apart(one, other))
+        pair = Pair(asked, model, values, one, other, *_apart(one, other), part)
         found = np.stack([apart(pair) for family in FAMILIES for _, apart in family(asked)])
     found[:, lost(one.status)] = np.inf
     found[:, lost(other.status)] = np.nan

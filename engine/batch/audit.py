@@ -51,6 +51,7 @@ BEYOND = 14.0
 #: Modes x steps over the whole time of a variant, some ten milliseconds, from which on it takes no level more than it
 #: needs to be known.
 DEAR = 1e7
+NUMBERS_ALONE = 0.0  # of what histories differ by: what is judged are the numbers that are told
 _NONE = np.zeros((0, 0)), np.zeros((0, 0))
 
 
@@ -232,7 +233,7 @@ class _Audited(NamedTuple):
         known = ~lost(true.status) & ~lost(archived.outcome.status)
         same = [self.truth.used[name][lanes] == archived.used[name] for name in USED]
         known &= ~np.all(same, axis=0)  # a march is no second source of itself
-        observed = differences(plan.asked, of.scene, values, archived.outcome, true)
+        observed = differences(plan.asked, of.scene, values, archived.outcome, true, NUMBERS_ALONE)
         told = told_errors(archived, plan.asked)
         return Audit(own[known], observed[:, known], told[:, known], self.truth.error[:, lanes[known]], 0)
 

@@ -100,6 +100,27 @@ def test_few_variants_are_audited_too() -> None:
     assert np.all(found.observed[:3] <= np.maximum(found.told[:3], 1e-4)) and np.all(found.doubt[:3] < 1e-3)
 
 
+def test_what_is_observed_is_the_difference_of_the_numbers_and_not_of_histories() -> None:
+    """A half of what the histories differ by, which estimates add, was counted as an error that the numbers had."""
+    variants = np.arange(9)
+    coarse, fine = (
+        make_plan(passages(3, 3, bed=bed, solver=given))
+        for bed, given in ((beam(modes=2), {"steps": 60}), (beam(), {"tolerance": 1e-7}))
+    )
+    found = on(coarse, variants)
+    own, true = (found_by(plan, variants) for plan in (coarse, fine))
+    names = [result.name for result in results_of(coarse.asked)]
+    for name in (names[0], names[2]):  # largest and root mean square
+        by_hand = np.abs(own.numbers[name] - true.numbers[name]) / true.scale[:, 0]
+        assert by_hand.max() > 1e-4
+        np.testing.assert_allclose(found.observed[names.index(name)], by_hand, atol=1e-4)
+
+
+def found_by(plan: Plan, variants: Any) -> Any:
+    (group,) = plan.groups
+    return group.found(plan.values(group, variants), variants, None, lambda: False).outcome
+
+
 def test_marches_that_are_dear_are_compared_with_others_too() -> None:
     """The next level takes more than a reference of pilots is worth; without it a march would be its own judge."""
     stiff = beam(length=2.5, area=0.03, second_moment=1e-4, youngs_modulus=110e9, density=7200.0, damping_ratio=0.04)
