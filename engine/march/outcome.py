@@ -12,17 +12,18 @@ from numpy.typing import NDArray
 
 from engine.kernels import layout
 from engine.kernels.schemes import Scheme
+from engine.march.contact_forces import contact_forces
 from engine.march.envelopes import MOST_KEPT, envelope_names
 from engine.march.march import Marched
 from engine.march.rest import counts_settling, elapsed, residuals, seconds_at, settling_times
 from engine.march.richardson import march_scheme
 from engine.march.step_rules import between_stations
 from engine.march.tables import SceneTables
-from engine.model.lane_table import in_whole_blocks, loads_of, static_loads, weight, weights
+from engine.model.lane_table import in_whole_blocks, loads_of, static_loads, weights
 from engine.model.scene_model import SceneModel
 from engine.model.strikes import Strikes
 from engine.model.timeline import Window
-from engine.observation.contact_forces import contacts_that_react, first_place_counted
+from engine.observation.contact_forces import contacts_that_react
 from engine.observation.cycle_reduction import Cycle, Reduction
 from engine.observation.histories import counts_reduced
 from engine.scene.variants import VariantValues
@@ -124,7 +125,7 @@ def outcome(
         **_extremes(tables, values, marched, counts),
         **residuals(tables, values, marched),
         **settling.times,
-        **_contact_forces(tables, values, marched),
+        **contact_forces(tables, values, marched),
         **_envelopes(tables, lanes, size, halted),
         **_statics(tables, values),
         **_reduced(asked.reduction, tables, values, own, reduction),
@@ -215,54 +216,6 @@ def _envelopes(own: SceneTables, values: VariantValues, size: int, halted: Calla
         if len(own.companions) > MOST_KEPT:
             tables.forget()
     return {name: np.stack(readings, axis=1) for name, readings in found.items()}
-
-
-def _contact_forces(tables: SceneTables, values: VariantValues, marched: Marched) -> Flat:
-    """Extremes of every contact force, and where it first was negative."""
-    found: Flat = {}
-    for c, carriage in enumerate(tables.model.carriages):
-        if not tables.model.study.carriage[carriage.name].reacts:
-            found |= _pressing(tables, values, c)
-            continue
-        statistics = marched.statistics[[len(tables.sensors) + k for k in _contacts_of(tables.model, c)]]
-        seen = (statistics[:, layout.LARGEST_AT] >= 0.0).any(axis=0)
-        # where a contact never counts, its smallest is infinite
-        least = np.argmin(statistics[:, layout.SMALLEST], axis=0)[None]
-        found[f"{carriage.name}_contact_force_max"] = np.where(seen, statistics[:, layout.LARGEST].max(axis=0), np.nan)
-        found[f"{carriage.name}_contact_force_min"] = np.where(seen, statistics[:, layout.SMALLEST].min(axis=0), np.nan)
-        place = tables.timeline.positions(c, np.take_along_axis(statistics[:, layout.SMALLEST_AT], least, axis=0)[0])
-        found[f"{carriage.name}_contact_force_min_position"] = place
-        opened = _opened_at(tables, marched, c)
-        found[f"{carriage.name}_separation_position"] = tables.timeline.positions(c, opened)
-    return found
-
-
-def _pressing(tables: SceneTables, values: VariantValues, carriage: int) -> Flat:
-    """The same of a plain force, which presses as it is written from where it first counts."""
-    name, first = tables.model.carriages[carriage].name, first_place_counted(tables.model, tables.timeline, carriage)
-    force = np.where(np.isnan(first), np.nan, weight(tables.model, values, carriage))
-    return {
-        f"{name}_contact_force_max": force,
-        f"{name}_contact_force_min": force.copy(),
-        f"{name}_contact_force_min_position": np.full(values.size, first),
-        f"{name}_separation_position": np.full(values.size, np.nan),
-    }
-
-
-def _opened_at(tables: SceneTables, marched: Marched, carriage: int) -> Array:
-    """(V,) count of the first station at which a carriage would lift off, or -1."""
-    contacts = _contacts_of(tables.model, carriage)
-    if not tables.model.may_lift(carriage):
-        return np.full(marched.statistics.shape[-1], -1.0)
-    after = [len(tables.sensors) + number for number in contacts]
-    below = np.concatenate([marched.unrecorded[contacts, layout.BELOW_AT], marched.statistics[after, layout.BELOW_AT]])
-    first = np.min(np.where(below >= 0.0, below, np.inf), axis=0)
-    return np.asarray(np.where(np.isfinite(first), first, -1.0))
-
-
-def _contacts_of(model: SceneModel, carriage: int) -> list[int]:
-    """Numbers of the contact forces of a carriage among all contact forces."""
-    return [number for number, force in enumerate(contacts_that_react(model)) if force.carriage == carriage]
 
 
 def _status(model: SceneModel, marched: Marched) -> tuple[NDArray[np.int8], NDArray[np.int64]]:
