@@ -14,6 +14,7 @@ from studies.findings.theory import body_mass
 from studies.protocol.study import kind_named
 from studies.results.findings_common import LOOSE
 from studies.results.formatting import percent, quantity
+from studies.results.kept import kept
 from studies.results.places import Index
 from studies.results.results import Results
 
@@ -116,12 +117,14 @@ def _scales(results: Results, name: str, sensor: str) -> tuple[Any, Any]:
     if name.endswith(("_settling_time", "_move_and_settle_time")):
         return dataset[name], np.nan  # over the time that is told, not the true one
     if f"{stem}_max" in dataset and f"{stem}_min" in dataset:
-        return _scales_of_ends(results, stem, _largest([dataset[f"{stem}_max"], dataset[f"{stem}_min"]]))
+        return _scales_of_ends(results, stem)
     return 1.0, np.nan  # an index
 
 
-def _scales_of_ends(results: Results, stem: str, own: xr.DataArray) -> tuple[Any, Any]:
-    """The same of what has a largest and a smallest value; own: the larger magnitude of both."""
+@kept
+def _scales_of_ends(results: Results, stem: str) -> tuple[Any, Any]:
+    """The same of what has a largest and a smallest value."""
+    own = _largest([results.dataset[f"{stem}_max"], results.dataset[f"{stem}_min"]])
     moves = kind_named(results.study.kind).moves_frames
     if stem in results.sensors and "dynamic_amplification" in results.dataset:
         static = own / results.of_sensor("dynamic_amplification", stem)

@@ -13,6 +13,7 @@ from results_schema.variable import outputs
 from studies.findings.theory import moves_away
 from studies.results.axes import Axis
 from studies.results.formatting import ROUNDING
+from studies.results.kept import kept
 from studies.results.places import Index, extreme
 from studies.results.results import Results
 
@@ -23,6 +24,7 @@ from studies.results.results import Results
 """)
 
 
+@kept
 def sizes(results: Results, sensor: str) -> Array:
     """The largest absolute value of a sensor, in the sweep's shape."""
     sides = (results.dataset[f"{sensor}_{side}"].transpose(*results.dims) for side in ("max", "min"))

@@ -1,7 +1,6 @@
 """How fast the start dies out of what goes to and fro, which variants have settled by the last cycle, and how far these
 differ forward and backward."""
 
-from functools import lru_cache
 from typing import Annotated
 
 import numpy as np
@@ -16,6 +15,7 @@ from studies.findings import theory
 from studies.protocol.study import question_of
 from studies.results.findings_common import in_words
 from studies.results.formatting import counted, number, percent
+from studies.results.kept import kept
 from studies.results.places import chosen, extreme
 from studies.results.results import Results
 
@@ -67,7 +67,7 @@ def _died_out(results: Results) -> Array:
     return np.asarray(np.exp(-decay_rates(results) * theory.cycle_time(results) * (theory.cycles(results) - 1.0)))
 
 
-@lru_cache(maxsize=1)
+@kept
 def growth(results: Results) -> Array:
     """By how much the vibration grows from cycle to cycle, in the sweep's shape, of the variants whose start has not
     died out, or which are far above statics or diverged: of many those furthest above; NaN elsewhere."""

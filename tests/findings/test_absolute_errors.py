@@ -14,6 +14,7 @@ from studies.reporting import answers
 from studies.reporting.comparison import compared
 from studies.reporting.summary import Range, in_tables
 from studies.results.findings_common import remedy
+from studies.results.kept import kept
 from studies.results.results import Results
 from tests.engine import build
 from tests.engine.build import beam, cruise, mass
@@ -234,3 +235,17 @@ def test_numbers_of_variants_are_not_rounded() -> None:
     worst["midspan_max"].values[1231] *= 2.0
     told = rows(Results.of(worst))["midspan_max"].largest.where
     assert "variant 1231" in told, told
+
+
+def test_what_is_asked_again_of_results_is_kept_with_these_alone() -> None:
+    asked = list[str]()
+
+    @kept
+    def find(results: Results, name: str) -> list[str]:
+        asked.append(name)
+        return [name]
+
+    one, other = (Results.of(scenes.run("double-peak")) for _ in range(2))
+    assert find(one, "a") is find(one, "a") and asked == ["a"]
+    assert find(one, "b") == ["b"] and find(one, "a") == ["a"] and asked == ["a", "b"]
+    assert find(other, "a") is not find(one, "a") and asked == ["a", "b", "a"]
