@@ -26,7 +26,7 @@ from results_schema.errors import WorkersGaveUp
 from results_schema.gravest_status import gravest, lost
 from results_schema.status import Status
 from results_schema.store.rows import Arrays, Chunk, Rows, joined
-from results_schema.variables import WHERE_OR_WHEN, axes, expand
+from results_schema.variables import WHERE_OR_WHEN, axes
 
 if TYPE_CHECKING:
     from engine.batch.plan import Plan
@@ -107,8 +107,7 @@ def _in_si(plan: Plan, values: VariantValues, arrays: Arrays) -> Arrays:
     if values.units is None:
         return arrays
     sensors = plan.study.sensor_units
-    known = {**axes(), **expand(plan.results, sensors, list(plan.study.carriage), plan.study.envelope_units)}
-    found = dict[str, NDArray[Any]]()
+    known, found = {**axes(), **plan.declared}, dict[str, NDArray[Any]]()
     for name, array in arrays.items():
         variable = known.get(name)
         if variable is None:  # what the study's own summary is made of

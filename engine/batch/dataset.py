@@ -18,7 +18,7 @@ from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
 from results_schema.lazy_imports import xr
 from results_schema.store.rows import Rows
-from results_schema.variables import Variable, axes, declarations, expand
+from results_schema.variables import axes, declarations
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -26,7 +26,7 @@ SHAPE_STATIONS = 201  # of the mode shapes in the archive
 
 
 def build(plan: Plan, arrays: Arrays, selected: Rows | None) -> xr.Dataset:
-    """The dataset of a study's results; variables that are not declared for `plan.results` are left out, except those
+    """The dataset of a study's results; variables that are not declared are left out, except those
     that the study's own summary is made of (`<sensor>_static`)."""
     dataset = results_over(plan, plan.cases, arrays)
     if selected is not None:
@@ -34,15 +34,9 @@ def build(plan: Plan, arrays: Arrays, selected: Rows | None) -> xr.Dataset:
     return with_ratios(plan, dataset)
 
 
-def _declared(plan: Plan) -> dict[str, Variable]:
-    """The declared results of a plan by name."""
-    study = plan.study
-    return expand(plan.results, study.sensor_units, list(study.carriage), study.envelope_units)
-
-
 def results_over(plan: Plan, cases: Cases, arrays: Arrays) -> xr.Dataset:
     """The results of some cases of a study, without histories and ratios."""
-    study, declared = plan.study, _declared(plan)
+    study, declared = plan.study, plan.declared
     reduction, results = plan.asked.reduction, results_of(plan.asked)
     labels = coordinates(cases) | {"sensor": ("sensor", list(study.sensor), {"long_name": "sensor"})}
     for name, places in envelope_places(plan.base).items():
@@ -158,7 +152,7 @@ def _narrowed(plan: Plan, values: Array) -> tuple[tuple[str, ...], Array]:
 
 def with_histories(plan: Plan, dataset: xr.Dataset, selected: Rows) -> xr.Dataset:
     """The dataset with histories: on the whole grid where every variant has one, else along ``history``."""
-    declared = _declared(plan)
+    declared = plan.declared
     stations = selected.arrays["elapsed"].shape[1]
     whole = selected.variants.size == plan.size
     lead = plan.cases.dims if whole else ("history",)

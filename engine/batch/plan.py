@@ -5,7 +5,7 @@ Everything follows from the study alone: neither chunks nor threads nor interrup
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from html import escape
@@ -43,7 +43,8 @@ from results_schema.cores import cores
 from results_schema.errors import BadInput, WorkersGaveUp
 from results_schema.status import Fidelity
 from results_schema.store.rows import Chunk
-from results_schema.variables import declarations, registered
+from results_schema.variables import Variable, declarations, registered
+from results_schema.variables import expand as declared_of
 
 CheckSteps = Callable[[SceneModel, VariantValues, Counts], None]
 
@@ -82,9 +83,9 @@ def _whole(plan: Plan, chunk: Chunk) -> Chunk:
 
 @dataclass(eq=False)
 class Plan:
-    """All work of a study. base: the scene without sweep. results: the kind whose declared results are kept. grids,
-    members: its scenes, and the variants of each. choice: of what a large sweep is computed with, once it is made.
-    reduce: what is kept of a chunk, where it is marched."""
+    """All work of a study. base: the scene without sweep. declared: what is kept, by name, which processes that compute
+    do not know of themselves. grids, members: its scenes, and the variants of each. choice: of what a large sweep is
+    computed with, once it is made. reduce: what is kept of a chunk, where it is marched."""
 
     study: Study
     cases: Cases
@@ -93,7 +94,7 @@ class Plan:
     members: tuple[Counts, ...]
     shown: Counts
     base: SceneModel
-    results: str
+    declared: Mapping[str, Variable]
     choice: Choice | None = None
     reduce: Callable[[Plan, Chunk], Chunk] = _whole
     _groups: tuple[Group, ...] = field(default=())
@@ -296,7 +297,8 @@ def make_plan(
             grids.append(grid)
             members.append(own)
     check_places(study, (grid.scene for grid in grids))
-    plan = Plan(study, cases, asked, tuple(grids), tuple(members), shown(study, cases.size), base, results)
+    declared = declared_of(results, study.sensor_units, list(study.carriage), study.envelope_units)
+    plan = Plan(study, cases, asked, tuple(grids), tuple(members), shown(study, cases.size), base, declared)
     if len(grids) > 1 and not plan.converges:
         share_ladder(asked, grids)
     check_memory(study, plan.size, plan.gathered_bytes)

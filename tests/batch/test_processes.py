@@ -61,9 +61,24 @@ def test_many_scenes_are_run_in_processes_and_give_the_same_bits(monkeypatch: py
             assert type(here).__name__ == "Threads" and here.threads == 2
     for more in (of_many_scenes(FEW_CONVERGING + 1), of_many_variants(FEW_CLIMBING + 1)):
         assert make_plan(more).many_scenes and make_plan(more).memory_bytes > 800 * 2**20
+    assert_same_by_processes(given)
+
+
+def assert_same_by_processes(given: Study) -> None:
     by_processes, by_thread = studies.run(given), studies.run(given, threads=1)
     for name in by_thread.variables:
         np.testing.assert_array_equal(by_processes[name].values, by_thread[name].values, err_msg=str(name))
+
+
+def test_what_is_marched_without_its_units_is_told_in_these_by_processes_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Processes did not know what kinds of studies declare: a swept modulus told moments and forces as of another one,
+    with status ok."""
+    monkeypatch.setattr(executors, "cores", lambda: 2)
+    moduli = {"of": "body.bed.youngs_modulus", "values": [1.0, 4.0]}
+    moment = {"body": "bed", "at": 0.4, "quantity": "bending_moment"}
+    given = of_many_scenes().with_values({"sweep.weight": moduli, "sensor.moment": moment})
+    assert make_plan(given).many_scenes
+    assert_same_by_processes(given)
 
 
 def test_short_chunks_are_put_together_and_each_variant_is_in_one_job() -> None:
