@@ -212,8 +212,7 @@ def where(results: Results, beyond: Mask, axis: Axis | None) -> str:
     if axis is not None and VARIANT in results.dims and _has_samples(results, axis):
         return _in_parts(results, axis, beyond)
     if axis is None or axis.dim == VARIANT:
-        share = f" ({percent(float(beyond.mean()))})" if results.size >= SHARED else ""
-        return f"in {counted(int(beyond.sum()), 'variant')} of {results.size:,}{share}" if beyond.any() else "nowhere"
+        return _share(results, beyond) if beyond.any() else "nowhere"
     others = [other for other in results.axes if other.name != axis.name]
     if len(others) != 1 or not 1 < others[0].values.size <= MOST_TOLD:
         return _along(results, axis, beyond)
@@ -224,6 +223,14 @@ def where(results: Results, beyond: Mask, axis: Axis | None) -> str:
         return next(iter(alike))
     last = sorted(alike.items(), key=lambda item: item[0].startswith("nowhere"))
     return "; ".join(f"{text} ({others[0].noun} {listed(values)})" for text, values in last)
+
+
+def _share(results: Results, beyond: Mask) -> str:
+    """How many variants are beyond something, of those that speak for all where no other one is."""
+    known = beyond | results.with_values
+    part = f" ({percent(float(beyond[known].mean()))})" if known.sum() >= SHARED else ""
+    those = f"the {known.sum():,} that count" if known.sum() < results.size else f"{results.size:,}"
+    return f"in {counted(int(beyond.sum()), 'variant')} of {those}{part}"
 
 
 def _everywhere(axis: Axis) -> str:

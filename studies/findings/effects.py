@@ -21,6 +21,9 @@ TIMES = 1.5  # the largest over the smallest from which on it is told how many t
 HALVED = 2.0  # the same of what falls
 #: Times both estimated errors, beyond which two ways differ: of 1,000 pairs of a symmetric portal two were beyond.
 SURELY = 2.0
+#: Parts of samples along a swept number, and variants in each at least: 1,200 draws of 30 to 1,000 variants all named
+#: the number that did most, whether rising, with a peak in the middle or up and down. And samples that are looked at.
+PARTS, LEAST_IN_PART, LOOKED_AT = 8, 5, 2**14
 
 
 def unchanged(results: Results, values: Array) -> str:
@@ -49,14 +52,25 @@ def _over_all(results: Results) -> str:
 
 
 def by_effect(results: Results, values: Array) -> list[Axis]:
-    """The swept numbers, that first along which values (in the sweep's shape) change most on average; those of samples
-    as they stand in the file."""
+    """The swept numbers, that first along which values (in the sweep's shape) change most on average; of samples that
+    which tells most of them."""
     varied = [axis for axis in results.axes if axis.values.size > 1]
     if VARIANT in results.dims:
-        return varied
+        return sorted(varied, key=lambda axis: -_explained(results, axis, values))
     known = xr.DataArray(np.where(results.with_values, values, np.nan), dims=results.dims)
     ranges = {axis.name: known.max(axis.dim) - known.min(axis.dim) for axis in varied}
     return sorted(varied, key=lambda axis: -float(ranges[axis.name].fillna(0.0).mean()))
+
+
+def _explained(results: Results, axis: Axis, values: Array) -> float:
+    """How much the means of ranks of values (in the sweep's shape) vary over parts of a swept number with as many
+    variants each; 0 where nothing is known."""
+    known = np.flatnonzero(results.with_values & np.isfinite(values))
+    known = known[:: -(-max(1, known.size) // LOOKED_AT)]
+    own = results.everywhere(results.dataset[axis.name]).reshape(-1)[known]
+    ranks = np.argsort(np.argsort(values.reshape(-1)[known]))[np.argsort(own, kind="stable")]
+    parts = np.array_split(ranks, max(1, min(PARTS, ranks.size // LEAST_IN_PART)))
+    return float(np.var([part.mean() for part in parts])) if ranks.size else 0.0
 
 
 def told_effects(results: Results, values: Array, what: str, error: Array | float = 0.0) -> str:

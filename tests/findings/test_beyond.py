@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 import xarray as xr
 
+from results_schema.arrays import Array
+from results_schema.status import Status
 from studies.findings.beyond import told_limit, where_beyond
+from studies.findings.effects import by_effect
 from studies.reporting import answers
 from studies.results.results import Results
 from tests.studies import scenes
@@ -225,3 +230,29 @@ def test_what_lies_between_others_and_is_not_among_them_is_left_out() -> None:
     assert part_of(three, [[False] * 5, some, some]) == (
         "from 2 m/s to the end of the sweep, 3 m/s (mass 50 and 70 to 90 kg)"
     )
+
+
+def samples(of_count: int = 60) -> Results:
+    """Of a mass, before which the file has a damping ratio that does nothing to what the tests make of it."""
+    zeta = f'zeta = {{ of = "body.bed.damping_ratio", sobol = {of_count}, from = 0.01, to = 0.02 }}'
+    mass = f'mass = {{ of = "carriage.table.mass", sobol = {of_count}, from = 50, to = 90 }}'
+    return Results.of(scenes.run("passage", f"{zeta}\n{mass}"))
+
+
+def test_shares_are_of_the_variants_that_count() -> None:
+    """610 of those whose contact holds were told as 41 % of all, of which 170 were left out."""
+    given = samples()
+    assert where_beyond(given, np.arange(60.0), 44.5, None) == "in 15 variants of 60 (25 %)"
+    status = given.dataset["status"].copy()
+    status[:10] = int(Status.SEPARATED)
+    opened = Results.of(given.dataset.assign(status=status))
+    assert where_beyond(opened, np.arange(60.0), 44.5, None) == "in 15 variants of the 50 that count (30 %)"
+
+
+@pytest.mark.parametrize("shape", [lambda mass: mass, lambda mass: np.cos((mass - 70.0) / 6.0)])
+def test_of_samples_that_number_is_first_which_tells_most(shape: Callable[[Array], Array]) -> None:
+    """Maps were over the first two numbers of the file, which changed nothing."""
+    results = samples()
+    zeta, mass = (results.everywhere(results.dataset[name]) for name in ("zeta", "mass"))
+    found = by_effect(results, shape(mass) + 10.0 * (zeta - 0.01))
+    assert [axis.name for axis in found] == ["mass", "zeta"]
