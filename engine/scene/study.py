@@ -127,7 +127,7 @@ class Study(Scene):
         """Write that as a file, which the commands read; its path. Raises BadInput where there is something at that
         place, but for a file with ``overwrite``, and OutputFailed."""
         path = Path(path)
-        (files.check_output_place if overwrite else files.check_new_place)(path)
+        files.check_place(path, overwrite=overwrite)
         files.write_text(path, self.toml())
         return path
 

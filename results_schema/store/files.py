@@ -185,11 +185,19 @@ def check_output_place(path: Path | str) -> None:
         raise output_failed(path, error) from error
 
 
-def check_new_place(path: Path) -> None:
-    """The same for a file that replaces none. Raises BadInput and OutputFailed."""
+def check_new_place(path: Path, otherwise: str = "remove it first") -> None:
+    """The same for a file that replaces none, but what may be done ``otherwise``. Raises BadInput and OutputFailed."""
     check_output_place(path)
     if path.exists():
-        raise BadInput("there is a file already", where=str(path), remedy="choose another name, or remove it first")
+        raise BadInput("there is a file already", where=str(path), remedy=f"choose another name, or {otherwise}")
+
+
+def check_place(path: Path, *, overwrite: bool) -> None:
+    """The same for a file that replaces another one if so asked. Raises BadInput and OutputFailed."""
+    if overwrite:
+        check_output_place(path)
+    else:
+        check_new_place(path, "replace it (--overwrite, in Python overwrite=True)")
 
 
 def check_replaceable(path: Path | str) -> None:

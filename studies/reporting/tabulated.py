@@ -68,7 +68,7 @@ def write_table(results: Results, path: Path, chosen: Sequence[str] = (), *, ove
     if path.suffix not in WRITERS:
         expected = f"a name that ends in {' or '.join(WRITERS)}"
         raise BadInput("unknown sort of table", where=str(path), expected=expected, received=path.suffix or "no ending")
-    (files.check_output_place if overwrite else files.check_new_place)(path)
+    files.check_place(path, overwrite=overwrite)
     parts = _parts(results)
     table, left_out = table_of(next(parts), chosen)
     if nowhere := [name for name in chosen if name in left_out]:

@@ -114,7 +114,8 @@ def test_a_dataset_is_exported_as_the_command_does(tmp_path: Path) -> None:
     assert main(["export", str(archive), str(by_command)]) == 2
     assert main(["export", str(archive), str(by_command), "--results", ",".join(results), "--overwrite"]) == 0
     assert by_call.read_bytes() == by_command.read_bytes()
-    assert "there is a file already" in refused(studies.export, found, by_call)
+    refusal = refused(studies.export, found, by_call)
+    assert "there is a file already" in refusal and "overwrite=True" in refusal
     studies.export(found, by_call, overwrite=True)
     assert len(by_call.read_bytes()) > len(by_command.read_bytes())
     assert "no such result" in refused(studies.export, found, tmp_path / "other.csv", ["deflection"])
