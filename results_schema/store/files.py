@@ -60,10 +60,12 @@ def write_whole(path: Path | str, write: Callable[[Path], object], look: Callabl
 
 def output_failed(path: Path, error: BaseException) -> OutputFailed:
     """The error for a failed operation on `path`, with the bytes that are free there."""
-    reason = getattr(error, "strerror", None) or str(error)
+    reason, free = getattr(error, "strerror", None) or str(error), _free_bytes(path.parent)
     is_full = getattr(error, "errno", None) in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+    if free == 0 and not is_full:  # of which netCDF's library says "Permission denied"
+        reason, is_full = os.strerror(errno.ENOSPC), True
     remedy = f"{'free some space or ' if is_full else ''}choose another place, then run again: finished work is kept"
-    return OutputFailed(f"cannot write ({reason})", path=path, free_bytes=_free_bytes(path.parent), remedy=remedy)
+    return OutputFailed(f"cannot write ({reason})", path=path, free_bytes=free, remedy=remedy)
 
 
 def _free_bytes(folder: Path) -> int | None:

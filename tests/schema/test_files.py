@@ -49,6 +49,16 @@ def _fails(path):
     return False
 
 
+def test_a_full_disk_is_told_whatever_a_library_calls_it(tmp_path, monkeypatch):
+    """netCDF's says "Permission denied", which sent people to look at the folder's rights."""
+    denied = PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    assert "Permission denied" in str(files.output_failed(tmp_path / "a", denied))
+    full = shutil.disk_usage(tmp_path)._replace(free=0)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: full)
+    told = str(files.output_failed(tmp_path / "a", denied))
+    assert "No space left on device" in told and "free some space" in told and "0 bytes free there" in told
+
+
 def test_the_failures_of_the_netcdf_library_are_output_failures(tmp_path):
     def fail(_: Path) -> None:
         raise RuntimeError("NetCDF: HDF error")
