@@ -191,8 +191,13 @@ def speaking(results: Results) -> Results:
 
 
 def left_out(results: Results) -> str:
-    """Which variants ranges leave out, in a sentence; "" where none."""
+    """Which variants ranges leave out, or count though they say little, in a sentence; "" where none."""
     lost = any(not status.values_kept for status in results.status_counts)
+    if not results.study.output.keeps_variants:
+        opened = results.status_counts.get(Status.SEPARATED, 0)
+        counting = f'Values count {counted(opened, "variant")} whose contact opens, which keep = "all" leaves out.'
+        without = f"{noun(results.dataset).capitalize()}s without values are left out."
+        return " ".join([without] * lost + [counting] * (opened > 0))
     opened = is_marched(results.dataset) and bool((results.with_values != results.kept.values).any())
     beside = ", and those whose contact opens of all but contact forces" if opened else ""
     if lost:

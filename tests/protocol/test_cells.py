@@ -205,6 +205,10 @@ def test_every_command_reads_archives_of_cells(here: Path, capsys: pytest.Captur
     assert command(["run", "study.toml", "-v", "-o", "a.nc"]) == 3
     said = " ".join(capsys.readouterr().out.split())
     assert "Of 900 variants the archive keeps" in said and "of each of 3 cells (speed)" in said
+    assert command(["run", "study.toml", "-o", "a.nc"]) == 3
+    opened = Results.of(open_archive("a.nc").root).status_counts[Status.SEPARATED]
+    counting = f'Values count {opened} variants whose contact opens, which keep = "all" leaves out.'
+    assert opened and counting in " ".join(capsys.readouterr().out.split())
     assert command(["run", "study.toml", "--json", "-o", "a.nc"]) == 3
     assert '"variants": 900' in capsys.readouterr().out
     assert command(["info", "a.nc"]) == 0
