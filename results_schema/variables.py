@@ -53,11 +53,14 @@ def registered() -> dict[str, tuple[Variable, ...]]:
 
 
 def declarations(kind: str) -> tuple[Variable, ...]:
-    """What a dataset of this kind may hold: the outputs of every kind, then its own (a group: only its own)."""
+    """What a dataset of this kind may hold: the outputs of every kind, then its own (a group: only its own). Raises
+    BadInput of a kind that nobody has declared: what is missing would count as without units."""
     if kind.startswith("/"):
         return tuple(REGISTRY.get("/" + kind.split("/")[1], {}).values())
-    shared = {} if kind in (EVERY_KIND, AXES) else REGISTRY.get(EVERY_KIND, {})
-    return tuple({**shared, **REGISTRY.get(kind, {})}.values())
+    if kind not in REGISTRY:
+        raise BadInput("no such kind of results is declared", where="results", received=repr(kind))
+    shared = {} if kind in (EVERY_KIND, AXES) else REGISTRY[EVERY_KIND]
+    return tuple({**shared, **REGISTRY[kind]}.values())
 
 
 def axes() -> dict[str, Variable]:

@@ -16,7 +16,7 @@ from engine.march.envelopes import envelope_names
 from engine.march.settling import names_of_times
 from engine.model.lane_table import weights
 from engine.observation.contact_forces import contacts_that_react
-from engine.observation.cycle_reduction import HISTORY_PART, OF_MEAN_SQUARES, Compared
+from engine.observation.cycle_reduction import HISTORY_PART, Compared
 from results_schema.arrays import Array
 from results_schema.gravest_status import lost
 from results_schema.quantities import QUANTITIES
@@ -31,6 +31,10 @@ if TYPE_CHECKING:
 
 
 ENDS = ("max", "min")
+#: Of `HISTORY_PART`, what root mean squares may be off by, in which errors of either sign cancel. With 1 15 % of 141
+#: told errors in 40 sweeps at 1e-3 were more than 30 times the true ones, with 0.4 1 %, and as few below these; with
+#: 0.2 three times as many were below.
+OF_MEAN_SQUARES = 0.4
 
 
 class Result(NamedTuple):

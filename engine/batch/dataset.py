@@ -26,8 +26,8 @@ SHAPE_STATIONS = 201  # of the mode shapes in the archive
 
 
 def build(plan: Plan, arrays: Arrays, selected: Rows | None) -> xr.Dataset:
-    """The dataset of a study's results; variables that are not declared are left out, except those
-    that the study's own summary is made of (`<sensor>_static`)."""
+    """The dataset of a study's results; variables that are not declared are left out, except those that the study's
+    own summary is made of (`<sensor>_static`)."""
     dataset = results_over(plan, plan.cases, arrays)
     if selected is not None:
         dataset = with_histories(plan, dataset, selected)

@@ -40,10 +40,10 @@ from engine.scene.variants import VariantValues, cases_tolerance, sweeps_numeric
 from results_schema.arrays import Array, Counts, split
 from results_schema.blocks import IN_MEMORY
 from results_schema.cores import cores
-from results_schema.errors import BadInput, WorkersGaveUp
+from results_schema.errors import WorkersGaveUp
 from results_schema.status import Fidelity
 from results_schema.store.rows import Chunk
-from results_schema.variables import Variable, declarations, registered
+from results_schema.variables import Variable, declarations
 from results_schema.variables import expand as declared_of
 
 CheckSteps = Callable[[SceneModel, VariantValues, Counts], None]
@@ -279,8 +279,6 @@ def make_plan(
     results: the kind whose declared results are kept, which must be declared by then; those of every march unless a
     study names its own. check_steps: refuses fixed steps that cannot be right.
     """
-    if results not in registered():
-        raise BadInput("no such kind of results is declared", where="results", received=repr(results))
     check_moves(study)
     cases = expand(study)
     window: Window = "whole" if reduction is None else "last-cycle"

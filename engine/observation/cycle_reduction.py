@@ -50,10 +50,6 @@ class Cycle:
 #: Of what histories differ by that values on them may be off without differing: with none of it 40 % of the estimated
 #: errors of 300 passages were too small, as two extremes agree by chance.
 HISTORY_PART = 0.5
-#: Of that part, what root mean squares may be off by, in which errors of either sign cancel. With 1 12 % of the told
-#: errors in 40 sweeps were more than 30 times the true ones at 1e-3, with 0.4 3 %, and as few below these, with 0.2
-#: three times as many.
-OF_MEAN_SQUARES = 0.4
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,10 +73,6 @@ class Compared:
     def of_readings(self, gap: Array) -> Array:
         """(V, J) a gap of values on histories over the scale, no less than a part of what these differ by."""
         return self.relative(np.maximum(gap, self.part * self.apart.T))
-
-    def of_mean_squares(self, gap: Array) -> Array:
-        """(V, J) a gap of root mean squares of histories over the scale, likewise."""
-        return self.relative(np.maximum(gap, OF_MEAN_SQUARES * self.part * self.apart.T))
 
     def relative(self, gap: Array) -> Array:
         """(V, J) a gap (V, J) in the sensors' units over the scale; NaN where that is 0 and the gap is not."""

@@ -80,7 +80,7 @@ class AsymmetryReduction:
         way = next(iter(compared.values.study.carriage.values())).motion.legs
         assert way is not None
         lag = compared.gap("lag") / (abs(way.end - way.start) * (1.0 - 2.0 * way.turn))
-        least = compared.of_mean_squares(np.zeros_like(compared.scale))
+        least = compared.of_readings(np.zeros_like(compared.scale))
         rms = {name: np.maximum(compared.gap(name), least) for name in ("odd_rms", "even_excess")}
         return {"lag": lag, "loop_area": compared.gap("loop_area")} | rms
 

@@ -232,10 +232,10 @@ def test_what_lies_between_others_and_is_not_among_them_is_left_out() -> None:
     )
 
 
-def samples(of_count: int = 60) -> Results:
-    """Of a mass, before which the file has a damping ratio that does nothing to what the tests make of it."""
-    zeta = f'zeta = {{ of = "body.bed.damping_ratio", sobol = {of_count}, from = 0.01, to = 0.02 }}'
-    mass = f'mass = {{ of = "carriage.table.mass", sobol = {of_count}, from = 50, to = 90 }}'
+def samples() -> Results:
+    """Sixty of a damping ratio and a mass, in this order of the file."""
+    zeta = 'zeta = { of = "body.bed.damping_ratio", sobol = 60, from = 0.01, to = 0.02 }'
+    mass = 'mass = { of = "carriage.table.mass", sobol = 60, from = 50, to = 90 }'
     return Results.of(scenes.run("passage", f"{zeta}\n{mass}"))
 
 
