@@ -113,6 +113,7 @@ class Rungs:
     aim: Converged
     levels: dict[int, Level]
     _rules: dict[int, tuple[Array, Array]] = field(default_factory=dict)
+    _held: dict[int, Array] = field(default_factory=dict)
 
     def march(self, lanes: Counts, halted: Halted, column: int, rung: int) -> March:
         """March some pilots on a rung. Raises Halted."""
@@ -124,11 +125,14 @@ class Rungs:
 
     def marched(self, lanes: Counts, column: int) -> Iterator[March]:
         """The marches of some pilots that were levels of their references."""
+        return self._of_steps(column, np.searchsorted(self.levels[column].lanes, lanes))
+
+    def _of_steps(self, column: int, own: Counts) -> Iterator[March]:
+        """The same by the places of pilots among those of the level."""
         level = self.levels[column]
-        own = np.searchsorted(level.lanes, lanes)
         for by in np.unique(level.by[own]):
             part = level.by[own] == by
-            yield self._measured(column, self.ladder.cuts.index(by), lanes[part], level.outcome.of(own[part]), 0.0)
+            yield self._measured(column, self.ladder.cuts.index(by), level.lanes[own[part]], level.outcome.of(own[part]), 0.0)
 
     def _measured(self, column: int, rung: int, lanes: Counts, now: Outcome, work: float) -> March:
         """What pilots report on a rung, beside their references."""
@@ -172,9 +176,19 @@ class Rungs:
         if column in self.levels:
             lanes, by = self.levels[column].lanes, self.levels[column].by
             work = wanted[lanes] * self.unit(column) * self.model(column).body_modes
-            enough = (scheme in FINE) | (by >= wanted[lanes]) | (work > self.truth.used["work"][lanes])
+            dear = work > self.aim.used["work"][lanes]
+            enough = dear | (by >= wanted[lanes]) | (self._of_level(column) <= ENOUGH * self.span[0])
             wanted[lanes] = np.where(enough, by, wanted[lanes])
         return np.searchsorted(np.array(self.ladder.cuts), wanted)
+
+    def _of_level(self, column: int) -> Array:
+        """(n,) the largest of the errors that are held, by the level of the reference that is a column."""
+        if column not in self._held:
+            level = self.levels[column]
+            self._held[column] = np.full(level.lanes.size, np.inf)
+            for march in self._of_steps(column, np.arange(level.lanes.size)):
+                self._held[column][np.searchsorted(level.lanes, march.lanes)] = march.held
+        return self._held[column]
 
     def known(self, column: int) -> NDArray[np.bool_]:
         """(P,) whether a column is judged by a level of the reference."""
