@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from engine.accuracy.grids import SceneGrid
 from engine.accuracy.jobs import InTurn, Job, Share
-from engine.accuracy.ladder import ENOUGH, Ladder, March, Rungs
+from engine.accuracy.ladder import ENOUGH, FLAT, Ladder, March, Rungs
 from engine.accuracy.reference import Converged, Level, Marches, as_fixed, converge, in_full, is_free, left_by_elements
 from engine.march.outcome import vibration
 from engine.model.numerics import open_bodies
@@ -29,6 +29,7 @@ from results_schema.arrays import Array, Counts
 HOPELESS = 0.9
 MORE = 2.0  # times the fewest modes that leave little: with 1.4 some variants missed the tolerance, 4 gained nothing
 JUDGED_BY = 12  # modes, at least, of the column that says whether a simpler model can do at all: 6 to 24 took 0.8 to 1
+TWICE = 2  # rungs to the one of twice the steps
 REFERENCE_PART = 0.25  # of the tolerance by which references may be off, which what they judge is told to be off too
 
 
@@ -69,6 +70,7 @@ class Climb:
     found: list[tuple[Counts, Array]] = field(init=False)
     held: Array = field(init=False)
     march: NDArray[np.int32] = field(init=False)
+    told_by: NDArray[np.int8] = field(init=False)
     marched: NDArray[np.bool_] = field(init=False)
     work: float = 0.0
     floor: dict[int, Array] = field(default_factory=dict)
@@ -86,6 +88,7 @@ class Climb:
         self.found = [(np.zeros(1, dtype=np.int64), np.full((1, len(truth.error)), np.inf))]
         self.march = np.zeros(shape, dtype=np.int32)
         self.held = np.full(shape, np.inf)
+        self.told_by = np.full(shape, -1, dtype=np.int8)
         self.marched = np.zeros(shape[:2], dtype=np.bool_)
         for name in dict.fromkeys(numerics.fidelity for numerics in self.ladder.columns):
             self._judge(name)
@@ -143,6 +146,24 @@ class Climb:
             holds = self.floor[column] <= ENOUGH * self.span[0]
             enough = np.where(holds & ~np.isfinite(enough), count, enough)
         self.enough[name] = enough
+        for column, more in pairwise(of_count.values()):
+            alike = np.isfinite(self.floor[more]) & (self.floor[column] <= FLAT * self.floor[more])
+            self._finer(column, np.flatnonzero(alike & (self.floor[column] > ENOUGH * self.span[0])))
+
+    def _finer(self, column: int, lanes: Counts) -> None:
+        """Judge a column by more steps, of pilots whose error more modes do not change, as long as it falls."""
+        cuts, floor = np.array(self.ladder.cuts), self.floor[column]
+        rung, dear = self.rungs.fine(column), self.rungs.truth.used["work"]
+        while lanes.size:
+            rung[lanes] += TWICE
+            lanes = lanes[rung[lanes] < cuts.size]
+            work = cuts[rung[lanes]] * self.rungs.unit(column) * self.rungs.model(column).body_modes
+            lanes = lanes[work <= dear[lanes]]
+            self._march(column, {int(one): lanes[rung[lanes] == one] for one in np.unique(rung[lanes])})
+            now = self.held[column, rung[lanes], lanes]
+            falls = (FLAT * now < floor[lanes]) & (now > ENOUGH * self.span[0])
+            floor[lanes] = np.minimum(floor[lanes], now)
+            lanes = lanes[falls]
 
     def _as_fixed(self, name: str, column: int) -> Array:
         """(P,) what modes that a study fixes leave of what is wanted of them: nothing, or what a simpler model does."""
@@ -184,12 +205,16 @@ class Climb:
         self._take(self.share(self.rungs, jobs))
 
     def _take(self, marches: Iterable[March]) -> None:
-        """What marches found; of a column's, finer rungs are no worse."""
+        """What marches found; of a column's, finer rungs are no worse than one that is small, or if not marched."""
         for column, rung, lanes, error, held, work in marches:
             numbers = sum(pilot.size for pilot, _ in self.found) + np.arange(lanes.size)
             self.marched[column, rung] = True
-            self.held[column, rung:, lanes] = held[:, None]
-            self.march[column, rung:, lanes] = numbers[:, None]
+            small = held <= ENOUGH * self.span[0]
+            finer, own = np.nonzero(small | (self.told_by[column, rung:, lanes].T <= rung))
+            finer, of_pilot = finer + rung, lanes[own]
+            self.held[column, finer, of_pilot] = held[own]
+            self.march[column, finer, of_pilot] = numbers[own]
+            self.told_by[column, finer, of_pilot] = rung
             self.found.append((lanes, error.T))
             self.work += work
 
