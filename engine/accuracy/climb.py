@@ -146,9 +146,11 @@ class Climb:
             holds = self.floor[column] <= ENOUGH * self.span[0]
             enough = np.where(holds & ~np.isfinite(enough), count, enough)
         self.enough[name] = enough
+        before = np.zeros(self.values.size, dtype=np.bool_)
         for column, more in pairwise(of_count.values()):
             alike = np.isfinite(self.floor[more]) & (self.floor[column] <= FLAT * self.floor[more])
-            self._finer(column, np.flatnonzero(alike & (self.floor[column] > ENOUGH * self.span[0])))
+            self._finer(column, np.flatnonzero(alike & ~before & (self.floor[column] > ENOUGH * self.span[0])))
+            before = alike
 
     def _finer(self, column: int, lanes: Counts) -> None:
         """Judge a column by more steps, of pilots whose error more modes do not change, as long as it falls."""
@@ -209,8 +211,8 @@ class Climb:
         for column, rung, lanes, error, held, work in marches:
             numbers = sum(pilot.size for pilot, _ in self.found) + np.arange(lanes.size)
             self.marched[column, rung] = True
-            small = held <= ENOUGH * self.span[0]
-            finer, own = np.nonzero(small | (self.told_by[column, rung:, lanes].T <= rung))
+            small, before = held <= ENOUGH * self.span[0], self.told_by[column, rung:, lanes].T
+            finer, own = np.nonzero(small | (before <= rung))
             finer, of_pilot = finer + rung, lanes[own]
             self.held[column, finer, of_pilot] = held[own]
             self.march[column, finer, of_pilot] = numbers[own]

@@ -130,9 +130,11 @@ class Rungs:
     def _of_steps(self, column: int, own: Counts) -> Iterator[March]:
         """The same by the places of pilots among those of the level."""
         level = self.levels[column]
-        for by in np.unique(level.by[own]):
+        for by in np.intersect1d(level.by[own], self.ladder.cuts):
             part = level.by[own] == by
-            yield self._measured(column, self.ladder.cuts.index(by), level.lanes[own[part]], level.outcome.of(own[part]), 0.0)
+            yield self._measured(
+                column, self.ladder.cuts.index(by), level.lanes[own[part]], level.outcome.of(own[part]), 0.0
+            )
 
     def _measured(self, column: int, rung: int, lanes: Counts, now: Outcome, work: float) -> March:
         """What pilots report on a rung, beside their references."""
@@ -168,7 +170,7 @@ class Rungs:
 
     def fine(self, column: int) -> Counts:
         """(P,) the rung at which a column's modes are judged: that of the reference's level, where it is one and has
-        steps enough, or more would be more work than the reference."""
+        steps enough, or leaves little, or more would be more work than the reference."""
         least, periods = self.least(column)
         scheme = self.model(column).scheme.name
         of_period, of_grid = FINE.get(scheme, FINE[""])
@@ -182,7 +184,8 @@ class Rungs:
         return np.searchsorted(np.array(self.ladder.cuts), wanted)
 
     def _of_level(self, column: int) -> Array:
-        """(n,) the largest of the errors that are held, by the level of the reference that is a column."""
+        """(n,) the largest of the errors that are held, by the level of the reference that is a column; infinite where
+        its steps are no rung's."""
         if column not in self._held:
             level = self.levels[column]
             self._held[column] = np.full(level.lanes.size, np.inf)

@@ -9,9 +9,12 @@ from numpy.typing import NDArray
 
 from engine.accuracy.climb import Climb, Measured
 from engine.accuracy.grids import SceneGrid
-from engine.accuracy.ladder import ENOUGH, ladder_of
+from engine.accuracy.ladder import ENOUGH, March, ladder_of
+from engine.batch.plan import make_plan
 from engine.march.step_rules import least_steps
+from studies.protocol.study import kind_of
 from tests.accuracy.passages import OPEN, only_grid, passages
+from tests.calibration.scenes import draw
 from tests.engine.bodies_on_contacts import FLEXIBLE, THREE, riding
 from tests.engine.build import Table, beam, cruise, fixed, force, mass, oscillator, shuttle, swing
 
@@ -176,6 +179,32 @@ def test_every_pilot_has_a_rung_that_holds() -> None:
     assert np.all(measured.held.min(axis=(0, 1)) <= 1.0)
     assert np.all(measured.reference[:3] <= 0.5e-2)  # of extremes and root mean squares
     assert measured.work > 0.0 and measured.marched.any()
+
+
+@pytest.mark.fault
+def test_modes_that_steps_limit_are_judged_by_more_of_these() -> None:
+    """Two swings of a sprung mass, whose columns of up to 24 modes left 0.59 and 0.44 of the tolerance by the steps
+    that they were judged with, so that variants near them took 32."""
+    given = draw(77, 11, 32, 1e-3)
+    kind = kind_of(given)
+    (grid,) = make_plan(given, reduction=kind.reduction(given), results=kind.name).grids
+    columns = ladder_of(grid.asked, grid)
+    held = Climb(grid, grid.values.part(np.array([24, 27])), columns).go().held
+    few = [number for number, numerics in enumerate(columns.columns) if numerics.modes <= 24]
+    assert np.all(held[few].min(axis=(0, 1)) <= 1.1 * ENOUGH)
+
+
+def test_what_was_measured_of_a_finer_rung_stays() -> None:
+    """Unless a coarser one is small: marches are not told in the order of their steps."""
+    grid = only_grid(passages(2, 2))
+    climb = Climb(grid, grid.values, ladder_of(grid.asked, grid))
+    climb.go()
+    climb.told_by[:] = -1  # as before any march
+    for rung, held in ((6, 0.3), (2, 0.5)):
+        found = np.array([held, held, held, ENOUGH * held])
+        climb._take([March(0, rung, np.arange(4), np.zeros((climb.found[0][1].shape[1], 4)), found, 0.0)])
+    assert np.all(climb.held[0, 2:6, :3] == 0.5) and np.all(climb.held[0, 6:, :3] == 0.3)
+    assert np.all(climb.held[0, 2:, 3] == 0.5 * ENOUGH)
 
 
 @pytest.mark.parametrize("fixed", [{}, {"fidelity": "mass"}, {"static_correction": False}])

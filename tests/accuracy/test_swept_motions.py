@@ -93,7 +93,8 @@ def test_scenes_of_which_some_move_slowly_on_stiff_contacts_share_a_ladder() -> 
     three of four variants of a gantry had no error."""
     key = "carriage.car.contacts.{}.stiffness"
     springs = {"of": [key.format(name) for name in TWO], "from": 100.0, "to": 1e5, "spacing": "log"}
-    swept_springs = {"springs": springs | {"count": FEW_SCENES + 2}}
+    lengths = {"of": "body.bed.length", "from": 1.0, "to": 1.2}  # each makes a scene
+    sweep = {axis: told | {"count": FEW_SCENES + 2} for axis, told in (("springs", springs), ("lengths", lengths))}
     plan = chosen_plan(
         riding(
             cruise(0.3, 0.7, 0.05),
@@ -101,7 +102,7 @@ def test_scenes_of_which_some_move_slowly_on_stiff_contacts_share_a_ladder() -> 
             initial="equilibrium",
             solver={"tolerance": TOLERANCE},
             sensor={"place": fixed(0.61)},
-            sweep=swept_springs,
+            sweep={"zip": True} | sweep,
         )
     )
     damps = [open_scheme(replace(grid, shared=None)) == DAMPED for grid in plan.grids]
