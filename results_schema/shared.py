@@ -75,11 +75,11 @@ declare(
             estimate exists
         estimated_error | result | | optional float32 nan | estimated error of every reported number
             over the largest static value of the sensor (velocity and acceleration, and where it reads nothing at rest:
-            over its own largest value; contact forces: over the weight; positions and lags: over the length of the
-            track and of the cruise; times of extremes: over one passage or cycle; indices: as they are; frequencies,
-            settling times and times of move and settling: over themselves; other results at rest: over the largest
-            along the way); of places and times of extremes no less than a step; NaN
-            where no estimate exists
+            over its own largest value; contact forces: over the weight, of forces that pulsate over their own largest;
+            positions and lags: over the length of the track and of the cruise; times of extremes: over one passage or
+            cycle; indices: as they are; frequencies, settling times and times of move and settling: over themselves;
+            other results at rest: over the largest along the way); of places and times of extremes no less than a step;
+            NaN where no estimate exists
         tolerance | result | | optional alone nan | tolerance of every reported number
             that of its sensor, else solver.tolerance; NaN where the error is reported, but not held
         """,

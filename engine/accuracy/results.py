@@ -103,11 +103,15 @@ class Pair:
         return _over(self.apart[signal], np.nanmax(np.abs(self.other.history[:, signal]), axis=0, initial=0.0))
 
     def contact_force(self, name: str, carriage: int) -> Array:
-        """An extreme of a contact force, over the weight."""
+        """An extreme of a contact force, over the weight; of a force that pulsates over its own largest value."""
         forces = contacts_that_react(self.model)
         histories = self.usually[len(self.usually) - len(forces) :]
         apart = histories[[force.carriage == carriage for force in forces]].max(axis=0, initial=0.0)
-        return _over(np.maximum(self.gap(name), self.part * apart), np.abs(self._weights[carriage]))
+        scale = np.abs(self._weights[carriage])
+        if carriage in self.model.pulsating:
+            stem, _, _ = name.rpartition("_")
+            scale = np.maximum(*(np.abs(self.other.numbers[f"{stem}_{end}"]) for end in ENDS))
+        return _over(np.maximum(self.gap(name), self.part * apart), scale)
 
     def envelope(self, name: str) -> Array:
         """Extremes along a body, over the largest anywhere."""

@@ -7,7 +7,7 @@ from engine.march.march import Marched
 from engine.march.tables import SceneTables
 from engine.model.lane_table import weight
 from engine.model.scene_model import SceneModel
-from engine.observation.contact_forces import contacts_that_react, first_place_counted
+from engine.observation.contact_forces import Way, contacts_that_react, ways_counted
 from engine.scene.variants import VariantValues
 from results_schema.arrays import Array
 
@@ -33,15 +33,41 @@ def contact_forces(tables: SceneTables, values: VariantValues, marched: Marched)
 
 
 def _pressing(tables: SceneTables, values: VariantValues, carriage: int) -> dict[str, Array]:
-    """The same of a plain force, which presses as it is written from where it first counts."""
-    name, first = tables.model.carriages[carriage].name, first_place_counted(tables.model, tables.timeline, carriage)
-    force = np.where(np.isnan(first), np.nan, weight(tables.model, values, carriage))
+    """The same of a force, which presses as it is written from where it first counts: it swings between a largest and
+    a smallest value, or all of it is constant."""
+    name, constant = tables.model.carriages[carriage].name, weight(tables.model, values, carriage)
+    pulsates = carriage in tables.model.pulsating
+    amplitude, omega, phase = values.pulsation(name) if pulsates else np.zeros((3, values.size))
+    largest, smallest, at = (np.full(values.size, np.nan) for _ in range(3))
+    for way in ways_counted(tables.model, tables.timeline, carriage):
+        begin, end = (omega * tau * values.scene_time_scale + phase for tau in (way.begin, way.end))
+        high = constant + amplitude * np.sin(_largest_sine(begin, end))
+        lowest = _largest_sine(begin + np.pi, end + np.pi) - np.pi
+        low = constant + amplitude * np.sin(lowest)
+        lower = ~(low >= smallest)
+        largest, smallest = np.fmax(largest, high), np.where(lower, low, smallest)
+        at = np.where(lower, _places(way, (lowest - begin) / np.maximum(end - begin, TINY)), at)
     return {
-        f"{name}_contact_force_max": force,
-        f"{name}_contact_force_min": force.copy(),
-        f"{name}_contact_force_min_position": np.full(values.size, first),
+        f"{name}_contact_force_max": largest,
+        f"{name}_contact_force_min": smallest,
+        f"{name}_contact_force_min_position": at,
         f"{name}_separation_position": np.full(values.size, np.nan),
     }
+
+
+TINY = np.finfo(np.float64).tiny  # of a force that is constant: it is smallest where it begins
+
+
+def _places(way: Way, part: Array) -> Array:
+    """Places (m) after a part of the time that a way takes."""
+    return way.places(np.clip(way.begin + part * (way.end - way.begin), way.begin, way.end))
+
+
+def _largest_sine(begin: Array, end: Array) -> Array:
+    """(V,) the angle from ``begin`` to ``end`` at which the sine is largest, the first one."""
+    peak = begin + (0.5 * np.pi - begin) % (2.0 * np.pi)
+    ends = np.where(np.sin(begin) >= np.sin(end), begin, end)
+    return np.where(peak <= end, peak, ends)
 
 
 def _opened_at(tables: SceneTables, marched: Marched, carriage: int) -> Array:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from engine.model.scene_model import SceneModel
     from engine.model.station_path import Along
     from engine.model.ties import Attachment
-    from engine.model.timeline import Timeline
+    from engine.model.timeline import Segment, Timeline
     from engine.observation.readings import Channel
 
 SPAN_COUNTED = 0.98  # of the span: beyond, the contact force does not converge with the modes
@@ -119,18 +120,44 @@ def contacts_that_react(model: SceneModel) -> tuple[ContactForce, ...]:
     return tuple(one for one in contact_forces(model) if known[model.carriages[one.carriage].name].reacts)
 
 
-def first_place_counted(model: SceneModel, timeline: Timeline, carriage: int) -> float:
-    """The first place (m) on a carriage's recorded way at which its contact force counts; NaN where it never does."""
+class Way(NamedTuple):
+    """A part of a carriage's way in one segment, from one scene time to another."""
+
+    rider: Rider
+    segment: Segment
+    begin: float
+    end: float
+
+    def places(self, tau: Array) -> Array:
+        """Where (m) the carriage is at scene times on it."""
+        return self.rider.path_on_body(tau, self.segment.start, self.segment.end).S
+
+
+def ways_counted(model: SceneModel, timeline: Timeline, carriage: int) -> Iterator[Way]:
+    """The parts of a carriage's recorded way on which its contact force counts."""
     tie = model.carriages[carriage]
     low, high = span_counted(model, tie.rider, tie.body)
     for segment in timeline.segments:
         if segment.recorded and segment.active[carriage]:
             tau: Array = segment.start + np.arange(segment.steps + 1, dtype=np.float64) * segment.step
-            place = tie.rider.path_on_body(tau, segment.start, segment.end).S
+            whole = Way(tie.rider, segment, segment.start, segment.end)
+            place = whole.places(tau)
             counted = np.flatnonzero((place >= low) & (place <= high))
-            if counted.size:
-                return float(place[counted[0]])
-    return np.nan
+            for run in np.split(counted, np.flatnonzero(np.diff(counted) > 1) + 1):
+                if run.size:
+                    beside = tau[max(run[0] - 1, 0)], tau[min(run[-1] + 1, tau.size - 1)]
+                    ends = (_edge(whole, (low, high), *pair) for pair in zip(beside, tau[run[[0, -1]]], strict=True))
+                    yield Way(tie.rider, segment, *ends)
+
+
+def _edge(way: Way, span: tuple[float, float], outside: float, inside: float) -> float:
+    """The scene time between two stations at which a carriage comes onto a span or leaves it: the one on it, if both
+    are."""
+    while abs(outside - inside) > 1e-12 * way.end:
+        middle = 0.5 * (outside + inside)
+        [place] = way.places(np.array([middle]))
+        outside, inside = (outside, middle) if span[0] <= place <= span[1] else (middle, inside)
+    return float(inside)
 
 
 def contact_forces(model: SceneModel) -> tuple[ContactForce, ...]:

@@ -137,7 +137,7 @@ def _scales_of_ends(results: Results, stem: str) -> tuple[Any, Any]:
         return np.nan, _largest([results.dataset[f"{whole}_max"], results.dataset[f"{whole}_min"]])
     carriage = next((one for one in results.study.carriage if stem.startswith(f"{one}_")), "")
     what = stem.removeprefix(f"{carriage}_")
-    if what == "contact_force" and not moves:
+    if what == "contact_force" and not moves and not results.study.carriage[carriage].pulsates:
         return weight(results, carriage), np.nan
     if what == "position" and moves:
         track = results.models.get(results.study.carriage[carriage].on)

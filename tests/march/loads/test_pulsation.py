@@ -214,3 +214,29 @@ def test_peaks_between_stations_are_told_of() -> None:
             told = float(found.estimated_error[n].sel(result=f"midspan_{end}"))
             assert abs(float(found[f"midspan_{end}"][n]) - true) / size <= told + 2e-6
             assert told >= 0.999 * missed * abs(true) / size
+
+
+@pytest.mark.fault
+@pytest.mark.parametrize("constant", [FORCE, 0.0])
+@pytest.mark.parametrize("frequency", [0.07, 0.31, 1.3])
+@pytest.mark.parametrize("motion", [cruise(-0.2, 1.1, SPEED), STANDS])
+def test_the_force_that_presses_is_told_with_what_it_swings_by(
+    constant: float, frequency: float, motion: Table
+) -> None:
+    """It was told without: 750 N of a walker who presses with up to 1,050 N. From end to end of the body, but for the
+    last 2 % before a held one, or all of the time for which it stands; and as a sensor reads it there."""
+    pulse = PULSE | {"frequency": frequency}
+    bed = beam(modes=3, damping_ratio=ZETA)
+    push = force(constant, motion, pulsation=pulse)
+    found = studies.run(study(bed, push, sensor={"push": {"carriage": "car", "quantity": "contact_force"}}))
+    stands = motion == STANDS
+    begin, end = (0.0, 2.0) if stands else (0.2 / SPEED, 1.18 / SPEED)
+    times = np.linspace(begin, end, 200_001)
+    pressed = constant + 1.5 * np.sin(2.0 * math.pi * frequency * times + 0.4)
+    least = 0.3 if stands else SPEED * times[np.argmin(pressed)] - 0.2
+    assert float(found.car_contact_force_max) == pytest.approx(pressed.max(), abs=1e-9)
+    assert float(found.car_contact_force_min) == pytest.approx(pressed.min(), abs=1e-9)
+    assert float(found.car_contact_force_min_position) == pytest.approx(least, abs=1e-5)
+    assert np.all(found.estimated_error.sel(result=["car_contact_force_max", "car_contact_force_min"]) < 1e-9)
+    if stands:
+        assert float(found.push_max) == pytest.approx(float(found.car_contact_force_max), rel=2e-3)
