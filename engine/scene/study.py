@@ -49,7 +49,9 @@ def _known_version(version: int) -> int:
 
 def _kind_name(kind: str) -> str:
     if not KIND.fullmatch(kind):
-        raise fault("not a name of a kind of study", expected='a name such as "asymmetry"', received=shortened(kind))
+        remedy = f'did you mean "{kind.lower()}"?' if KIND.fullmatch(kind.lower()) else ""
+        expected = 'a name such as "asymmetry"'
+        raise fault("not a name of a kind of study", expected=expected, received=shortened(kind), remedy=remedy)
     return kind
 
 

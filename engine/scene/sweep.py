@@ -251,10 +251,14 @@ def _check_repeats(study: Study, cases: Cases) -> None:
     paired = [axis.values for axis in cases.axes if axis.dim == VARIANT] if study.sweep.zip else []
     if not paired or any(np.unique(values).size == len(values) for values in paired):  # and with these every row
         return
-    counts = np.unique(np.array(paired), axis=1, return_counts=True)[1]
+    _, own, counts = np.unique(np.array(paired), axis=1, return_inverse=True, return_counts=True)
     if (counts > 1).any():
-        what = "zipped axes repeat a variant"
-        raise study.source.fault("sweep", what, received=f"{int((counts > 1).sum())} repeated")
+        repeated = counts[own.reshape(-1)] > 1
+        first = np.flatnonzero(own.reshape(-1) == own.reshape(-1)[np.argmax(repeated)])
+        received = (
+            f"{int((counts > 1).sum())} repeated, first entry {first[1] + 1} as entry {first[0] + 1} of every axis"
+        )
+        raise study.source.fault("sweep", "zipped axes repeat a variant", received=received)
 
 
 def broken(study: Study, cases: Cases, check: Check) -> tuple[Mapping[str, Any], Mapping[str, int]] | None:

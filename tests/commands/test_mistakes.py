@@ -36,6 +36,12 @@ def trained(keys: str) -> str:
 MISTAKES = {
     "a swept scheme": (axis('scheme = { of = "solver.scheme", values = ["auto"] }'), 2, ["word cannot be swept"]),
     "swept supports": (axis('s = { of = "body.beam.supports", values = ["free-free"] }'), 2, ["word cannot be swept"]),
+    "a kind with a capital": (SMALL.replace('kind = "passage"', 'kind = "Passage"'), 2, ['mean "passage"?']),
+    "a row twice": (
+        axis('zip = true\na = { of = "carriage.trolley.motion.speed", values = [1, 3, 2, 3] }\n'
+             'b = { of = "carriage.trolley.mass", values = [0.1, 0.2, 0.2, 0.2] }'),
+        2, ["sweep: zipped axes repeat a variant; received 1 repeated, first entry 4 as entry 2 of every axis"],
+    ),
     "second moment in mm4": (
         OTHER.replace("= 1e-6", "= 1e6"), 2, ["body.beam.second_moment", "no beam has this", '"1e+06 mm^4"'],
     ),
