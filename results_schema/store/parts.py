@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import IO, Self
+from typing import IO, NamedTuple, Self
 
 import numpy as np
 
@@ -82,12 +82,24 @@ _NOBODY = np.empty(0, np.int64)
 Part = Mapping[str, Table]
 
 
+class Origin(NamedTuple):
+    """The study that parts are of: its name, its text, and what another text has otherwise, in words ("" where it
+    cannot be told)."""
+
+    name: str = ""
+    text: str = ""
+    changed: Callable[[str], str] = lambda _: ""
+
+
+UNNAMED = Origin()
+
+
 class PartStore:
     """The parts of one archive by name, locked while the `with` block lasts.
 
-    key: what the results depend on. study: its name, kept beside them. look: called under the lock, before anything is
-    touched; it may refuse what lies at the archive's place. discard: parts with another key are removed instead of
-    refused (`--overwrite`).
+    key: what the results depend on. study: whose they are, kept beside them. look: called under the lock, before
+    anything is touched; it may refuse what lies at the archive's place. discard: parts with another key are removed
+    instead of refused (`--overwrite`).
     Entering raises ArchiveBusy when another run holds the archive, and BadInput when parts there have another key, or
     files that are none of ours lie among them.
     """
@@ -98,7 +110,7 @@ class PartStore:
         key: str,
         look: Callable[[], object] = lambda: None,
         *,
-        study: str = "",
+        study: Origin = UNNAMED,
         discard: bool = False,
     ) -> None:
         self.key, self._study = key, study
@@ -129,11 +141,12 @@ class PartStore:
             raise BadInput(what, where=str(self._folder), received=", ".join(others), remedy=remedy)
         found = _stored_key(self._folder)
         if found and found != self.key and not self._discard:
+            changed = self._study.changed(_stored_text(self._folder))
             raise BadInput(
                 "unfinished parts of another study or program version are there",
                 where=str(self._folder),
-                expected=f"key {self.key}",
-                received=f"key {found}",
+                expected="those of this very study" if changed else f"key {self.key}",
+                received=changed or f"key {found}",
                 remedy="finish that run with its own study and version, or discard its parts with --overwrite",
             )
         if found != self.key:
@@ -141,7 +154,7 @@ class PartStore:
             files.remove_folder(self._folder)
         files.make_folder(self._folder)
         if found != self.key:
-            files.write_text(self._folder / _KEY_FILE, f"{self.key}\n{self._study}\n")
+            files.write_text(self._folder / _KEY_FILE, f"{self.key}\n{self._study.name}\n{self._study.text}")
 
     def write(self, name: str, part: Part) -> Path:
         """Store one finished part, tables by group ("/" first).
@@ -251,6 +264,14 @@ def _variants_of(root: Table) -> np.ndarray:
 def _folder_of(archive: Path | str) -> Path:
     """The folder of an archive's unfinished run."""
     return Path(f"{archive}.parts")
+
+
+def _stored_text(folder: Path) -> str:
+    """The text of the study whose parts are in a folder, "" where it cannot be told."""
+    try:
+        return (folder / _KEY_FILE).read_text(encoding="utf-8").partition("\n")[2].partition("\n")[2]
+    except (OSError, UnicodeDecodeError):
+        return ""
 
 
 def _stored_key(folder: Path) -> str:

@@ -5,7 +5,7 @@ Killed at any moment it leaves finished parts behind, and goes on from them when
 
 import os
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial, singledispatch
@@ -17,7 +17,7 @@ import xarray as xr
 from engine.kernels.compiling import told_of_compiling
 from engine.model.distinct_models import base_scene
 from engine.scene.study import Study
-from engine.study_file.changes import changes
+from engine.study_file.changes import Change, changes
 from results_schema.errors import ArchiveBusy, ArchiveError, BadInput, OutputFailed, shortened
 from results_schema.store import files
 from results_schema.store.archive import (
@@ -28,7 +28,7 @@ from results_schema.store.archive import (
     study_text,
     write_archive,
 )
-from results_schema.store.parts import PartStore, bytes_so_far
+from results_schema.store.parts import Origin, PartStore, bytes_so_far
 from studies.protocol.listener import NOBODY, Listener
 from studies.protocol.options import RunOptions
 from studies.protocol.parts import Pieces, Variants, Work
@@ -91,8 +91,9 @@ def run_to_archive(
     parts = kind.parts(study)
     files.check_free(archive.parent, parts.disk_bytes - bytes_so_far(archive), parts.words)
     listener.remark(parts.remarks)
-    key, name = run_key(study, parts.names), study.source.name
-    with PartStore(archive, key, partial(_look, run), study=name, discard=options.overwrite) as store:
+    key = run_key(study, parts.names)
+    origin = Origin(study.source.name, study.source.text, partial(_changed_parts, study))
+    with PartStore(archive, key, partial(_look, run), study=origin, discard=options.overwrite) as store:
         if _look(run) == "same study, finished":  # somebody else has finished it since the run began
             store.remove()
             return _found_finished(run)
@@ -245,12 +246,27 @@ def _something_else(study: Study, archive: Path) -> tuple[str, str]:
     except ValueError:  # no archive, or one whose text is no study
         return "there is something else already", ""
     same = not {"kind", "title"} & {change.key for change in found}
-    shown = [f"{key}: {_written(old)}, now {_written(new)}" for key, old, new in found[:CHANGES_SHOWN]]
-    more = [f"{len(found) - CHANGES_SHOWN} more"] if len(found) > CHANGES_SHOWN else []
     return (
         f"the archive there is of {'another state of this' if same else 'another'} study",
-        "; ".join([*shown, *more]) or "the same keys and values, with other comments or in another order",
+        _in_words(found) or "the same keys and values, with other comments or in another order",
     )
+
+
+def _changed_parts(study: Study, other: str) -> str:
+    """By which keys the study of unfinished parts differs; "" where its text was not kept or cannot be read."""
+    try:
+        found = changes(other, study.source.text) if other else []
+    except ValueError:
+        return ""
+    same = "the same keys and values, by another version of wanderlast or with other contents of its files"
+    return _in_words(found) or (same if other else "")
+
+
+def _in_words(found: Sequence[Change]) -> str:
+    """The first changes of a study, and how many more there are."""
+    shown = [f"{key}: {_written(old)}, now {_written(new)}" for key, old, new in found[:CHANGES_SHOWN]]
+    more = [f"{len(found) - CHANGES_SHOWN} more"] if len(found) > CHANGES_SHOWN else []
+    return "; ".join([*shown, *more])
 
 
 def _written(value: Any) -> str:

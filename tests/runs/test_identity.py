@@ -267,6 +267,21 @@ def test_parts_of_another_study_are_computed_again(
     assert_same_results(open_archive("small.nc").root, open_archive("whole.nc").root)
 
 
+def test_parts_of_a_changed_study_are_refused_by_what_changed(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured
+) -> None:
+    """Two keys by which nobody finds it were named; these are left where an earlier version kept no text."""
+    write(here, SCENES)
+    interrupted(monkeypatch, 1, "small.toml")
+    write(here, SCENES.replace("damping_ratio = 0.02", "damping_ratio = 0.3"))
+    for told in ("those of this very study, received body.beam.damping_ratio: 0.02, now 0.3; remedy", "received key"):
+        capsys.readouterr()
+        assert main(["run", "small.toml"]) == 2
+        assert told in capsys.readouterr().err
+        kept = Path("small.nc.parts/key")
+        kept.write_text("\n".join([*kept.read_text().splitlines()[:2], ""]))
+
+
 @pytest.mark.fault(43)
 def test_pieces_of_another_study_are_computed_again(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The pieces of a bed with another stiffness have the same names."""
@@ -341,8 +356,8 @@ def test_every_part_says_whose_it_is(here: Path, monkeypatch: pytest.MonkeyPatch
     """The key stands in the part itself, not only in the folder's file."""
     write(here, SCENES)
     interrupted(monkeypatch, 1)
-    key, name = Path("small.nc.parts/key").read_text(encoding="utf-8").splitlines()
-    assert name == "small.toml" and key == run_key(engine.load("small.toml"))
+    key, name, *text = Path("small.nc.parts/key").read_text(encoding="utf-8").splitlines()
+    assert name == "small.toml" and key == run_key(engine.load("small.toml")) and text == SCENES.splitlines()
     for path in Path("small.nc.parts").glob("*.nc"):
         with xr.open_dataset(path) as part:
             assert part.attrs["run_key"] == key
