@@ -207,7 +207,7 @@ class Climb:
         self._take(self.share(self.rungs, jobs))
 
     def _take(self, marches: Iterable[March]) -> None:
-        """What marches found; of a column's, finer rungs are no worse than one that is small, or if not marched."""
+        """What marches found; of a column's, finer rungs are no worse, unless marched and this one is not small."""
         for column, rung, lanes, error, held, work in marches:
             numbers = sum(pilot.size for pilot, _ in self.found) + np.arange(lanes.size)
             self.marched[column, rung] = True

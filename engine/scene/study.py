@@ -50,8 +50,8 @@ def _known_version(version: int) -> int:
 def _kind_name(kind: str) -> str:
     if not KIND.fullmatch(kind):
         remedy = f'did you mean "{kind.lower()}"?' if KIND.fullmatch(kind.lower()) else ""
-        expected = 'a name such as "asymmetry"'
-        raise fault("not a name of a kind of study", expected=expected, received=shortened(kind), remedy=remedy)
+        what, expected = "not a name of a kind of study", 'a name such as "asymmetry"'
+        raise fault(what, expected=expected, received=shortened(kind), remedy=remedy)
     return kind
 
 
@@ -300,9 +300,7 @@ def json_schema(kinds: Sequence[str]) -> dict[str, Any]:
 
 def load(path_or_text: str | Path) -> Study:
     """The study of a file, or of TOML text with line breaks. Raises BadInput."""
-    document = read_document(path_or_text)
-    _check_version(document)
-    return Study(document)
+    return Study(_read(path_or_text))
 
 
 def study_of(given: Study | str | Path) -> Study:
@@ -323,11 +321,9 @@ def _no_study(given: object, expected: str) -> BadInput:
 def load_recorded(text: str, recorded: Mapping[str, Recorded]) -> Study:
     """The study of an archive from its text: bodies out of files are as recorded, and no file is opened.
 
-    recorded: by the names of bodies; one that is missing, as of a body that nothing uses, has no length. Raises
-    BadInput.
+    recorded: by the names of bodies; one that is missing, as nothing uses it, has no length. Raises BadInput.
     """
-    document = read_document(f"{text}\n")
-    _check_version(document)
+    document = _read(f"{text}\n")
     tables = document.data.get("body")
     if not isinstance(tables, dict):
         return Study(document)
@@ -342,11 +338,13 @@ def _beside(table: Any, recorded: Recorded) -> Any:
     return table | {"recorded": recorded} if made_of_files else table
 
 
-def _check_version(document: Document) -> None:
+def _read(path_or_text: str | Path) -> Document:
+    """The tables of a study file, or of its text, which must say their version. Raises BadInput."""
+    document = read_document(path_or_text)
     if "schema_version" not in document.data:
-        where = document.source.where("schema_version")
         expected = f"schema_version = {SCHEMA_VERSION} at the top of the file, above the first [table]"
-        raise BadInput("this key is missing", where=where, expected=expected)
+        raise BadInput("this key is missing", where=document.source.where("schema_version"), expected=expected)
+    return document
 
 
 def verify(study: Study) -> None:

@@ -258,8 +258,9 @@ def _changed_parts(study: Study, other: str) -> str:
         found = changes(other, study.source.text) if other else []
     except ValueError:
         return ""
-    same = "the same keys and values, by another version of wanderlast or with other contents of its files"
-    return _in_words(found) or (same if other else "")
+    otherwise = "by another version of wanderlast or with other contents of its files"
+    same = otherwise if other == study.source.text else "with other comments or in another order"
+    return _in_words(found) or (f"the same keys and values, {same}" if other else "")
 
 
 def _in_words(found: Sequence[Change]) -> str:

@@ -81,8 +81,8 @@ MISTAKES = {
     ),
     "millipascals": (OTHER.replace("= 1e9", '= "210000 mPa"'), 0, ["mPa is a thousandth of Pa; was MPa"]),
     "distances of axles in mm": (
-        trained("spacing = [25, 150, 25]"),
-        0, ["axles of train ice stand up to 150 m apart, 200 m in all: were millimetres meant?"],
+        trained("spacing = [2500, 15000, 2500]").replace("speed = 5.0", "speed = 500.0"),
+        0, ["axles of train ice stand up to 15000 m apart, 20000 m in all: were millimetres meant?"],
     ),
     "a length in mm that is in m": (
         SMALL.replace("length = 1.0", 'length = "1 mm"'),
