@@ -215,7 +215,7 @@ def differences(model: FloatingModel, one: Outcome, other: Outcome) -> Array:
             gap = np.where(neither | known | (gap <= signal.noise), 0.0, gap)
             found.append(np.divide(gap, scale, out=np.where(gap > 0.0, np.inf, 0.0), where=scale > 0.0))
     of_ends = gaps[:, ends(model)].reshape(-1, len(model.bodies), 3).max(axis=2)
-    found += [of_ends[:, b] / body.length for b, body in enumerate(model.bodies.values())]
+    found += [of_ends[:, b] / _reach(model, name) for b, name in enumerate(model.bodies)]
     for time in (time for name in banded(model) for time in names_of_times(name)):
         gap, took = np.abs(one.numbers[time] - other.numbers[time]), other.numbers[time]
         gap = np.where(np.isnan(gap), np.where(np.isnan(one.numbers[time]) & np.isnan(took), 0.0, np.inf), gap)
@@ -227,6 +227,11 @@ def differences(model: FloatingModel, one: Outcome, other: Outcome) -> Array:
     apart[:, lost(one.status)] = np.inf
     apart[:, lost(other.status)] = np.nan
     return apart
+
+
+def _reach(model: FloatingModel, name: str) -> float:
+    """The longest track (m) of those that carry the far end of a body, its own too: what is short hangs on an arm."""
+    return max(model.bodies[carrier].length for carrier in model.carriers(name))
 
 
 def frame_signals(model: FloatingModel) -> slice:

@@ -32,12 +32,12 @@ def answer(results: Results, seconds: float) -> list[str]:
 def others(results: Results, seconds: float) -> Iterator[str]:
     """All but carriages that slide."""
     yield from _ended(results, seconds)
+    yield from _beyond_theory(results)
     yield from _sensors(results)
     yield from _driven(results)
     yield from _ends(results)
     yield from _energy(results)
     yield from _momentum(results)
-    yield from _beyond_theory(results)
     yield from told_statuses(results)
 
 

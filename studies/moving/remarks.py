@@ -227,7 +227,9 @@ def _clamped_at_a_hinge(looked: Looked) -> Iterator[str]:
         if about[Y] > ACROSS * np.linalg.norm(about):
             yield (
                 f"{name} is clamped where {here} turns freely: no moment acts there, and clamped shapes need many "
-                f'modes to say so; body.{name}.supports = "pinned-{told.partition("-")[2]}" takes a few'
+                f"modes to say so, by which a march may fail that stiffens {name}; body.{name}.supports = "
+                f'"pinned-{told.partition("-")[2]}" takes a few, and tells deflections and joint_angle from its mean '
+                "axis"
             )
 
 

@@ -1,5 +1,6 @@
 """Bodies in a tree: two links, rigid and flexible, and a spring-driven joint."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from engine.floating.converge import levels
-from engine.floating.results import frame_signals
+from engine.floating.results import differences, ends, frame_signals, outcome, results_of
 from engine.scene.study import Study
 from tests.floating.scenes import ARM, FOX_GOODWIN, history, steps
 
@@ -51,6 +52,17 @@ def test_two_rigid_links_against_lagrange() -> None:
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.05)
     once = [(4.0 * fine - coarse) / 3.0 for coarse, fine in pairwise(ends)]
     assert (16.0 * once[1] - once[0]) / 15.0 == pytest.approx(wanted, abs=1e-9)
+
+
+def test_ends_of_what_is_short_are_compared_by_what_carries_it() -> None:
+    """How far the far end of a payload of 0.1 mm is off was told by its own length: more than the whole of it."""
+    model, marched = steps(double_pendulum(LINK, LINK | {"length": 1e-4}), 1.0, 800, 8)
+    whole, off = outcome(model, marched), outcome(model, replace(marched, history=marched.history.copy()))
+    off.history[:, -1, ends(model)] += 1e-3
+    names = [result.name for result in results_of(model)]
+    apart = dict(zip(names, differences(model, off, whole)[:, 0], strict=True))
+    assert apart["far end of upper"] == pytest.approx(1e-3)
+    assert apart["far end of lower"] == pytest.approx(1e-3)
 
 
 def test_a_flexible_double_pendulum_keeps_its_energy() -> None:

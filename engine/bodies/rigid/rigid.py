@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from engine.bodies.modal.description import Body
 from engine.bodies.modal.modal_body import Array, ModalBody
@@ -40,6 +40,14 @@ class Rigid(Body):
     mass: Mass = Field(ge=0)
     inertia: Inertia = Field(ge=0)
     centre: Length | None = None
+
+    @field_validator("inertia", mode="before")
+    @classmethod
+    def _of_pitch(cls, value: Any) -> Any:
+        if isinstance(value, list):
+            remedy = "one number here, and inertia = [about x, about y, about z] in [frame.NAME] of a body that moves"
+            raise fault("several moments of inertia", expected="that of pitch", received=str(value), remedy=remedy)
+        return value
 
     @model_validator(mode="after")
     def _bends_nowhere(self) -> Rigid:

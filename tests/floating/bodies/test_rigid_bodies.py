@@ -10,6 +10,7 @@ from scipy.special import ellipj, ellipkinc
 
 from engine.kernels.floating.observe import BODY_ATTITUDE, BODY_SPIN
 from engine.scene.study import Study
+from results_schema.errors import BadInput
 from studies.moving.parts import quaternions
 from tests.floating.scenes import history, steps
 
@@ -79,6 +80,12 @@ def test_torque_free_tumbling() -> None:
     errors = [np.abs(one - wanted).max() for one in found]
     assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx(2.0, abs=0.05)
     assert extrapolated(found) == pytest.approx(wanted, abs=1e-9)
+
+
+def test_several_moments_of_inertia_stand_in_the_frame() -> None:
+    body = {"hull": {"kind": "rigid", "length": 2.0, "mass": 5.0, "inertia": [1.0, 2.0, 3.0]}}
+    with pytest.raises(BadInput, match=r"body\.hull\.inertia: several moments of inertia.*in \[frame.NAME\]"):
+        Study(kind="moving-frames", body=body, frame={"hull": {"joints": [{"kind": "free"}]}})
 
 
 class Chain:

@@ -11,7 +11,7 @@ from results_schema.errors import BadInput
 from studies.findings.absolute_errors import absolute_errors
 from studies.protocol.study import kind_of
 from studies.results.results import Results
-from tests.engine.build import beam, cruise, force, study
+from tests.engine.build import beam, cruise, force, steel, study
 
 GRAVITY, MASS, LENGTH, INERTIA, STIFFNESS = 9.81, 3.0, 0.8, 0.2, 5e3
 ARM = {"kind": "rigid", "length": LENGTH, "mass": MASS, "inertia": INERTIA, "own_weight": True}
@@ -21,14 +21,14 @@ DRIVEN = {"kind": "revolute", "axis": [0, 1, 0], "motion": {"kind": "steady", "r
 ANGLE, SHIFT = {"body": "arm", "quantity": "joint_angle"}, {"body": "arm", "quantity": "joint_displacement"}
 
 
-def held_by(joints: list[dict[str, Any]], sensor: dict[str, Any]) -> Study:
+def held_by(joints: list[dict[str, Any]], sensor: dict[str, Any], arm: Any = ARM, duration: float = 2.0) -> Study:
     return Study(
         kind="moving-frames",
         gravity=GRAVITY,
-        body={"arm": ARM},
+        body={"arm": arm},
         frame={"arm": {"joints": joints}},
-        sensor={"joint": sensor},
-        question={"duration": 2.0},
+        sensor={"joint": sensor} if "body" in sensor else sensor,
+        question={"duration": duration},
     )
 
 
@@ -57,6 +57,20 @@ def test_one_of_several_joints_by_its_number() -> None:
     shift = studies.run(held_by([SWINGS, along], SHIFT | {"joint": 1}))
     assert float(angle["joint_min"]) == pytest.approx(-np.pi - 1.2, rel=1e-2)
     assert 0.0 < float(shift["joint_max"]) < 1e-4
+
+
+def test_a_pinned_beam_turns_at_its_pin_by_its_mean_axis_less_its_slope() -> None:
+    """As the same beam does whose clamped shapes do not turn there, as far as their modes go."""
+    section = {"area": 3.7e-4, "second_moment": 2.1e-9, "youngs_modulus": 70e9, "density": 2700.0}
+    sensors, found = {"joint": ANGLE, "slope": {"body": "arm", "at": 0.0, "quantity": "rotation"}}, {}
+    for end in ("pinned", "clamped"):
+        body = steel(2.0, **section, supports=f"{end}-free", modes=7, damping_ratio=0.02)
+        found[end] = studies.run(held_by([SWINGS | {"start": -0.5}], sensors, body, 1.0))
+    axis, slope = (found["pinned"][name].values for name in ("joint", "slope"))
+    clamped = found["clamped"]["joint"].values
+    assert np.abs(found["clamped"]["slope"].values).max() < 1e-15
+    assert np.abs(axis - slope - clamped).max() < 0.3 * np.abs(axis - clamped).max()
+    assert np.abs(slope).max() > 5e-3
 
 
 @pytest.mark.parametrize(
